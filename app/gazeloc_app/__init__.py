@@ -1,0 +1,1 @@
+"""GazeLoc's browser app and command line."""

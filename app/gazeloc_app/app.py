@@ -1,0 +1,256 @@
+"""The app: builds the server, the state, the views and the worker processes for one project, and ties them together.
+
+browser ── callbacks ──► actions ──► Store (one loop) ──► views: panels, SceneView, each Browser
+                                        └──► effects: save what people decided, start jobs
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import viser
+
+from gazeloc_app import tasks
+from gazeloc_app.actions import JobEnded, NameRenderer, Notify, OpenRecording, ShowFrame, StartJob
+from gazeloc_app.browser import Browser
+from gazeloc_app.data import ProjectData
+from gazeloc_app.jobs import JobRunner
+from gazeloc_app.panels.alignment import AlignmentPanel
+from gazeloc_app.panels.export import ExportPanel
+from gazeloc_app.panels.frames import FramePanel
+from gazeloc_app.panels.keypoints import KeypointPanel
+from gazeloc_app.panels.layers import LayerPanel
+from gazeloc_app.panels.project import JobBar, ProjectPanel
+from gazeloc_app.pictures import Pictures
+from gazeloc_app.render_process import RenderProcess
+from gazeloc_app.render_worker import Describe, Sources
+from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
+from gazeloc_app.scene_view import SceneView
+from gazeloc_app.server import make_server
+from gazeloc_app.state import Annotation, AppState, Level
+from gazeloc_app.store import Store
+from gazeloc_core import pipeline
+from gazeloc_core.errors import GazelocError, ProjectError
+from gazeloc_core.project import Chosen, Project
+from gazeloc_core.resources import static_file
+from gazeloc_core.stages import inputs
+
+log = logging.getLogger(__name__)
+
+
+class App:
+    """One project in the browser, until `stop()`. Holds the project's write lock."""
+
+    def __init__(self, project: Project, *, host: str = "127.0.0.1", port: int = 8080):
+        """Open the project.
+
+        Raises:
+            GazelocError: if the address is refused, the port is taken, another process writes to the project, or the
+                scan or the first recording cannot be opened.
+        """
+        self.project = project
+        with ExitStack() as undo:  # what was begun is ended again where a later step is refused
+            self._lock = undo.enter_context(project.lock())
+            self.data = ProjectData(project, self._say_damage)
+            self.data.scan()
+            self.store = Store(_first_state(project), batch=lambda: self.server.atomic())
+            self.data.recording(self.store.state.recording)
+            self.jobs = JobRunner(project.folder, self.store.dispatch)
+            self._render = RenderProcess(_sources(project), self._say_trouble)
+            undo.callback(self._render.close)
+            self.server = make_server(port, self._routes(), host=host, title=f"GazeLoc · {project.folder.name}")
+            undo.pop_all()
+        self._browsers: dict[int, Browser] = {}
+        self._unsaved: dict[str, Annotation] = {}
+        self._last_job = 0
+        self.scene = SceneView(self.server, self.data, self._render)
+        self._build_panels()
+        self.store.add_view(self.scene.render)
+        self.store.add_view(self._render_browsers)
+        self.store.add_effect(self._save)
+        self.store.add_effect(self._start_job)
+        self.store.add_effect(self._show_first_pose)
+        self.server.on_client_connect(self._connected)
+        self.server.on_client_disconnect(self._disconnected)
+
+    def start(self) -> None:
+        """Render everything and start the loop; load what the first click and the first picture need."""
+        self._go_to_first_pose(self.store.state)
+        self.store.start()
+        threading.Thread(target=self._warm_up, name="gazeloc-warm-up", daemon=True).start()
+        colors = pipeline.stage_named("colors", of_scan=True)
+        if colors.is_needed(self.project) and not colors.artifact(self.project, "").exists:
+            self.store.dispatch(StartJob("Colour the scan", tasks.color_scan))
+
+    def stop(self) -> None:
+        """End the loop, the worker processes and the server, and let others write to the project."""
+        self.store.stop()
+        self.jobs.stop()
+        self._render.close()
+        self.server.stop()
+        self._lock.release()
+
+    @property
+    def address(self) -> str:
+        """What to open in the browser."""
+        return f"http://localhost:{self.server.get_port()}"
+
+    def run_everything(self) -> None:
+        """Start the stages that are missing, as the button does."""
+        self.store.dispatch(StartJob("Run everything", tasks.run_all, (("recording", self.store.state.recording),)))
+
+    def _build_panels(self) -> None:
+        gui, dispatch, state = self.server.gui, self.store.dispatch, self.store.state
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(400)
+        job_bar = JobBar(gui, self.jobs.cancel)
+        tabs = gui.add_tab_group(order=1000)
+        with tabs.add_tab("Project"):
+            project_panel = ProjectPanel(gui, self.project, state, dispatch, self._open_recording)
+        with tabs.add_tab("Keypoints"):
+            keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
+        with tabs.add_tab("Align"):
+            alignment_panel = AlignmentPanel(gui, self.data, dispatch)
+        with tabs.add_tab("Layers"):
+            layer_panel = LayerPanel(gui, dispatch)
+        with tabs.add_tab("Export"):
+            export_panel = ExportPanel(gui, self.project.folder / "export", dispatch)
+        side = gui.add_panel()
+        with side.add_tab("Frame"):
+            frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
+        side.dock_left()
+        side.set_width(430)
+        panels = (job_bar, project_panel, keypoint_panel, alignment_panel, layer_panel, export_panel, frame_panel)
+        for panel in panels:
+            self.store.add_view(panel.render)
+
+    def _routes(self) -> Routes:
+        routes = Routes()
+        add_static_route(routes)
+        pictures = Pictures(self.data, self._render, lambda: self.store.state)
+        add_picture_routes(routes, pictures.frame, pictures.render)
+        return routes
+
+    def _warm_up(self) -> None:
+        try:
+            self.data.raycaster().cast([[0, 0, 0]], [[0, 0, 1]])
+            description = self._render.submit(Describe()).result()
+            self.store.dispatch(NameRenderer(description.note))
+            self.jobs.warm_up()
+        except GazelocError as error:
+            self.store.dispatch(Notify(Level.ERROR, str(error)))
+
+    def _say_damage(self, sentence: str) -> None:
+        self.store.dispatch(Notify(Level.ERROR, sentence))
+
+    def _say_trouble(self, sentence: str) -> None:
+        self.store.dispatch(Notify(Level.WARNING, sentence))
+
+    async def _connected(self, client: viser.ClientHandle) -> None:
+        browser = Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
+        self._browsers[client.client_id] = browser
+
+    async def _disconnected(self, client: viser.ClientHandle) -> None:
+        self._browsers.pop(client.client_id, None)
+
+    def _render_browsers(self, state: AppState) -> None:
+        for browser in list(self._browsers.values()):
+            browser.render(state)
+
+    def _look_through(self, client_id: int, frame: int) -> None:
+        browser = self._browsers.get(client_id)
+        if browser is not None:
+            browser.look(frame)
+
+    def _open_recording(self, name: str) -> None:
+        try:
+            self.project.recording(name)
+            self.data.recording(name)
+            self.store.dispatch(OpenRecording(name, self._unsaved.get(name) or _annotation(self.project, name)))
+        except GazelocError as error:
+            self.store.dispatch(Notify(Level.ERROR, str(error)))
+
+    def _save(self, before: AppState, after: AppState) -> None:
+        """Write what people decided; what cannot be written is kept and tried again with every further action."""
+        if before.annotation != after.annotation:
+            self._unsaved[after.recording] = after.annotation
+        for name, annotation in list(self._unsaved.items()):
+            try:
+                self._write(name, annotation)
+            except OSError as error:
+                raise ProjectError(
+                    f"{self.project.folder}: your last changes could not be saved ({error.strerror}); free some space "
+                    "or mend the folder's permissions and go on, they are kept until then."
+                ) from error
+            del self._unsaved[name]
+
+    def _write(self, recording: str, annotation: Annotation) -> None:
+        self.project.save_keypoints(recording, annotation.keypoints)
+        chosen = None
+        if annotation.alignment is not None:
+            chosen = Chosen(alignment=annotation.alignment, by_person=annotation.alignment_by_person)
+        if self.project.settings.chosen.get(recording) != chosen:
+            self.project.choose(recording, chosen)
+
+    def _show_first_pose(self, before: AppState, after: AppState) -> None:
+        """A recording often begins before its first pose: start where there is something to compare."""
+        is_new = after.annotation.alignment != before.annotation.alignment or before.recording != after.recording
+        if is_new and after.frame == 0:
+            self._go_to_first_pose(after)
+
+    def _go_to_first_pose(self, state: AppState) -> None:
+        trajectory = self.data.trajectory(state.recording, state.annotation.alignment)
+        if trajectory is not None and trajectory.is_registered.any():
+            self.store.dispatch(ShowFrame(int(np.flatnonzero(trajectory.is_registered)[0])))
+
+    def _start_job(self, before: AppState, after: AppState) -> None:
+        del before
+        if after.job is None or after.job.number == self._last_job:
+            return
+        self._last_job = after.job.number
+        if self._unsaved:
+            text = f"“{after.job.name}” was not begun: it reads the project's files, and those could not be saved."
+            self.store.dispatch(JobEnded(Level.ERROR, text))
+        else:
+            self.jobs.start(after.job.name, after.job.task, **dict(after.job.keywords))
+
+
+def serve(folder: Path, *, host: str = "127.0.0.1", port: int = 8080, run_everything: bool = False) -> None:
+    """Open a project in the browser and print its address; returns when the process is asked to end."""
+    app = App(Project.open(folder), host=host, port=port)
+    app.start()
+    if run_everything:
+        app.run_everything()
+    print(f"GazeLoc is at {app.address} (end it with Ctrl-C)", flush=True)
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    ended.wait()
+    app.stop()
+
+
+def _first_state(project: Project) -> AppState:
+    names = tuple(project.settings.recordings)
+    if not names:
+        raise ProjectError(f"{project.folder}: the project has no recording; add one with `gazeloc add`.")
+    return replace(AppState(names, names[0]), annotation=_annotation(project, names[0]))
+
+
+def _annotation(project: Project, recording: str) -> Annotation:
+    chosen = project.settings.chosen.get(recording)
+    keypoints = project.keypoints(recording)
+    if chosen is None:
+        return Annotation(keypoints)
+    return Annotation(keypoints, chosen.alignment, chosen.by_person)
+
+
+def _sources(project: Project) -> Sources:
+    recordings = {name: partial(inputs.load_recording, project, name) for name in project.settings.recordings}
+    return Sources(mesh=partial(inputs.load_mesh, project), recordings=recordings)

@@ -1,0 +1,293 @@
+"""The command line: `gazeloc new | add | run | view | status | evaluate | export | demo`.
+
+Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
+code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
+
+Parsing comes first and imports nothing heavy, so that help and a mistyped flag are answered at once; only then is the
+command imported and run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import os
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from gazeloc_app.loopback import check_loopback
+from gazeloc_core import __version__
+from gazeloc_core.errors import Cancelled, GazelocError, InputError
+
+TAG_SIZE_HELP = """Metres between the corners that the detector reports. For tag36h11 and its kin that is the outer \
+edge of the black square, for the tagStandard and tagCircle families the *inner* square, not the printed edge \
+(. is data):
+
+tag36h11            tagStandard41h12
+# # # # # # # #     . . . . . . . . .
+# . . . . . . #     . # # # # # # # .
+# . . . . . . #     . #           # .
+# . . . . . . #     . #   . . .   # .
+# . . . . . . #     . #   . . .   # .
+# . . . . . . #     . #   . . .   # .
+# . . . . . . #     . #           # .
+# # # # # # # #     . # # # # # # # .
+<---- size --->     . . . . . . . . .
+                       <- size -->
+
+"""
+
+Command = Callable[[], None]
+Project = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PROJECT", help="The project folder.")]
+OptionalPath = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
+OptionalText = Annotated[str | None, tyro.conf.arg(metavar="TEXT")]
+OptionalName = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
+TagSize = Annotated[float | None, tyro.conf.arg(metavar="METRES", help=TAG_SIZE_HELP)]
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+
+
+def deferred(command: Callable[..., None]) -> Callable[..., Command]:
+    """The command with its arguments, to be run once parsing has ended."""
+
+    @functools.wraps(command)
+    def bind(*values: Any, **named: Any) -> Command:
+        return functools.partial(command, *values, **named)
+
+    return bind
+
+
+@deferred
+def new(
+    project: Project,
+    *,
+    scan: Path,
+    recording: Path,
+    colmap: OptionalPath = None,
+    colmap_times: OptionalPath = None,
+    truth: OptionalPath = None,
+    tag_family: OptionalName = None,
+    tag_size: TagSize = None,
+    name: OptionalName = None,
+    unit: OptionalText = None,
+    up: OptionalText = None,
+) -> None:
+    """Make a project of a room scan and a first recording. Both stay where they are and are never written to.
+
+    Args:
+        project: The project folder, new or empty.
+        scan: The room scan: a 3D Scanner App folder, or a mesh (PLY, OBJ, GLB).
+        recording: The recording: a Pupil Cloud export, or a folder of images with a camera file.
+        colmap: A COLMAP model of the recording's frames, used instead of our own reconstruction.
+        colmap_times: CSV `name,timestamp_ns` that says which frame each image of that model is.
+        truth: Ground truth, TUM lines of scan_from_camera; read by evaluations and views, by nothing else.
+        tag_family: The family of the AprilTags in the room, e.g. tag36h11.
+        tag_size: Size of the tags in metres.
+        name: The recording's name; by default that of its folder.
+        unit: The unit of a mesh whose file does not say: m, cm, mm, ft or in.
+        up: The axis that points up in a mesh whose file does not say: x, y, z, -x, -y or -z.
+    """
+    from gazeloc_app import commands
+
+    commands.new(
+        project,
+        scan=scan,
+        unit=unit,
+        up_axis=up,
+        tag_family=tag_family,
+        tag_size_m=tag_size,
+        name=name,
+        recording=commands.entry(recording, colmap, colmap_times, truth),
+    )
+
+
+@deferred
+def add(
+    project: Project,
+    *,
+    recording: Path,
+    name: OptionalName = None,
+    colmap: OptionalPath = None,
+    colmap_times: OptionalPath = None,
+    truth: OptionalPath = None,
+) -> None:
+    """Add another recording in the same room.
+
+    Args:
+        project: The project folder.
+        recording: The recording.
+        name: Its name; by default that of its folder.
+        colmap: A COLMAP model of the recording's frames.
+        colmap_times: CSV `name,timestamp_ns` that says which frame each image of that model is.
+        truth: Ground truth, TUM lines of scan_from_camera.
+    """
+    from gazeloc_app import commands
+
+    commands.add(project, name=name, recording=commands.entry(recording, colmap, colmap_times, truth))
+
+
+@deferred
+def run(project: Project, *, method: str = "sfm", recording: OptionalName = None) -> None:
+    """Run every stage that is missing or stale, from the files to gaze in the room.
+
+    Args:
+        project: The project folder.
+        method: How frames are localised.
+        recording: Only this recording; by default all.
+    """
+    from gazeloc_app import commands
+
+    commands.run(project, method=method, recording=recording)
+
+
+@deferred
+def view(project: Project, *, port: int = 8080, host: str = "127.0.0.1") -> None:
+    """Open the project in the browser.
+
+    Args:
+        project: The project folder.
+        port: The port of the app; 0 takes a free one.
+        host: The address to listen on; only the loopback is allowed (use `ssh -L` from elsewhere).
+    """
+    check_loopback(host)
+    from gazeloc_app.app import serve
+
+    serve(project, host=host, port=port)
+
+
+@deferred
+def status(project: Project, *, json: Flag = False) -> None:
+    """Say which stages are fresh, stale, missing or failed.
+
+    Args:
+        project: The project folder.
+        json: Print one JSON object instead of a table.
+    """
+    from gazeloc_app import commands
+
+    commands.status(project, as_json=json)
+
+
+@deferred
+def evaluate(
+    project: Project, *, truth: OptionalPath = None, recording: OptionalName = None, json: Flag = False
+) -> None:
+    """Compare the estimated poses with the ground truth. Nothing is aligned to the truth first.
+
+    Args:
+        project: The project folder.
+        truth: TUM lines of scan_from_camera with the recording's own timestamps; by default what the project names.
+        recording: Only this recording; by default all that have a truth.
+        json: Print one JSON object instead of a table.
+    """
+    from gazeloc_app import commands
+
+    commands.evaluate(project, truth=truth, recording=recording, as_json=json)
+
+
+@deferred
+def export(project: Project, *, format: str, output: Path, recording: OptionalName = None) -> None:
+    """Write the aligned poses (and with csv the gaze in 3D) for other programs.
+
+    Args:
+        project: The project folder.
+        format: csv, tum, colmap or nerfstudio.
+        output: The folder to write to; several recordings get a folder each.
+        recording: Only this recording; by default all.
+    """
+    from gazeloc_app import commands
+
+    commands.export(project, format=format, output=output, recording=recording)
+
+
+@deferred
+def demo(*, port: int = 8080) -> None:
+    """Open the app on the sample scene that GazeLoc brings along.
+
+    Args:
+        port: The port of the app; 0 takes a free one.
+    """
+    from gazeloc_app.demo import open_demo
+
+    open_demo(port=port)
+
+
+COMMANDS: dict[str, Any] = {
+    "new": new,
+    "add": add,
+    "run": run,
+    "view": view,
+    "status": status,
+    "evaluate": evaluate,
+    "export": export,
+    "demo": demo,
+}
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command and exit."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        if arguments == ["--version"]:
+            print(f"gazeloc {__version__}")
+            return
+        _parsed(arguments)()
+        sys.stdout.flush()
+    except Cancelled:
+        sys.exit(130)
+    except GazelocError as error:
+        print(f"gazeloc: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("gazeloc: stopped; what was done stays.", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:  # `gazeloc ... | head`: nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+
+
+def _parsed(arguments: list[str]) -> Command:
+    """The command that the arguments name.
+
+    Raises:
+        InputError: if they are none, in one line instead of tyro's box.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            command: Command = tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="gazeloc",
+                description="Where in the room did this person look? Registers eye-tracking glasses onto a room scan. "
+                f"This is version {__version__}; `gazeloc COMMAND --help` explains a command.",
+                args=arguments,
+            )
+    except SystemExit as stop:
+        if stop.code:
+            raise InputError(_in_one_line(said.getvalue(), arguments)) from None
+        raise
+    return command
+
+
+def _in_one_line(box: str, arguments: list[str]) -> str:
+    """What a box of tyro's says up to its first rule, and where there is help."""
+    rows = [re.sub(r"\x1b\[[0-9;]*m", "", row).strip("│ ") for row in box.splitlines()]
+    rows = [row for row in rows if row and row[0] not in "╭╰"]
+    end = next((i for i, row in enumerate(rows) if row.startswith("──")), len(rows))
+    text = " ".join(rows[:end]).replace("(required)", "").replace(". Expected 1 values", "").rstrip(" .")
+    if found := re.match(r"Error parsing (--[a-z-]+)", text):  # paths and texts parse always, so it is a number
+        text = f"{found[1]} {_value_of(found[1], arguments)}: this is not a number that it can take"
+    named = next((word for word in arguments if word in COMMANDS), None)
+    return f"{text}; see `gazeloc {named} --help`." if named else f"{text}; see `gazeloc --help`."
+
+
+def _value_of(flag: str, arguments: list[str]) -> str:
+    for position, word in enumerate(arguments[:-1]):
+        if word == flag:
+            return arguments[position + 1]
+    return next((word.split("=", 1)[1] for word in arguments if word.startswith(f"{flag}=")), "")

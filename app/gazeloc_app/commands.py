@@ -1,0 +1,166 @@
+"""What the command line's commands do: check what the user named, call the pipeline, print."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from gazeloc_app.terminal import progress_bar, table
+from gazeloc_core import pipeline
+from gazeloc_core.errors import InputError, ProjectError
+from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.readers import open_recording, open_scan
+from gazeloc_core.stages.recording import own_frames_of_model
+from gazeloc_core.stages.scan import check_tags_can_be_mapped
+from gazeloc_core.tags import FAMILIES
+from gazeloc_core.truth import read_tum
+
+
+def entry(path: Path, colmap: Path | None, colmap_times: Path | None, truth: Path | None) -> RecordingEntry:
+    """A recording's entry, its paths made absolute."""
+    return RecordingEntry(
+        path=path.resolve(),
+        colmap=colmap and colmap.resolve(),
+        colmap_times=colmap_times and colmap_times.resolve(),
+        truth=truth and truth.resolve(),
+    )
+
+
+def new(
+    folder: Path,
+    *,
+    scan: Path,
+    unit: str | None,
+    up_axis: str | None,
+    tag_family: str | None,
+    tag_size_m: float | None,
+    name: str | None,
+    recording: RecordingEntry,
+) -> Project:
+    """Open everything once, so that what is wrong is said now, and make the project."""
+    tags = _checked_tags(tag_family, tag_size_m)
+    opened = open_scan(scan, unit=unit, up_axis=up_axis, colored=False)
+    if tags is not None:
+        check_tags_can_be_mapped(opened)
+    notes = [*opened.notes, *_checked_recording(recording)]
+    name = name or _name_of(recording.path)
+    settings = Settings(
+        scan=ScanEntry(path=scan.resolve(), unit=unit, up_axis=up_axis), tags=tags, recordings={name: recording}
+    )
+    project = Project.create(folder, settings)
+    print("\n".join(notes))
+    print(f"{folder}: a project with the recording {name!r}. Next: gazeloc run {folder}")
+    return project
+
+
+def add(folder: Path, *, name: str | None, recording: RecordingEntry) -> None:
+    """Open the recording once and add it to the project."""
+    project = Project.open(folder)
+    with project.lock():
+        notes = _checked_recording(recording)
+        name = name or _name_of(recording.path)
+        project.add_recording(name, recording)
+    print("\n".join(notes))
+    print(f"{folder}: the recording {name!r} was added. Next: gazeloc run {folder}")
+
+
+def run(folder: Path, *, method: str, recording: str | None) -> None:
+    """Run the stages with a progress bar, and say how long each took and what the alignment is worth."""
+    project = Project.open(folder)
+    with project.lock(), progress_bar() as report:
+        times = pipeline.run(project, method=method, recording=recording, report=report)
+    total = sum(time.seconds for time in times) or 1.0
+    rows = [
+        [time.recording or "scan", time.title, f"{time.seconds:.1f} s", f"{100 * time.seconds / total:.0f} %"]
+        for time in times
+        if time.ran
+    ]
+    print(table(["of", "stage", "time", "share"], rows))
+    for name in [recording] if recording else project.settings.recordings:
+        for level, text in pipeline.verdicts(project, name):
+            print(f"{name}: {level}: {text}")
+
+
+def status(folder: Path, *, as_json: bool) -> None:
+    """Print how every stage stands."""
+    project = Project.open(folder)
+    found = pipeline.statuses(project)
+    if as_json:
+        print(json.dumps({"project": str(project.folder), "stages": [asdict(item) for item in found]}, indent=1))
+        return
+    print(table(["of", "stage", "state", ""], [[s.recording or "scan", s.title, s.state, s.reason] for s in found]))
+
+
+def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json: bool) -> None:
+    """Print the errors against the truth, in centimetres and degrees or as JSON in metres and degrees."""
+    project = Project.open(folder)
+    found = pipeline.evaluate_project(project, truth=truth, recording=recording)
+    if as_json:
+        value = {name: {method: e.to_json() for method, e in methods.items()} for name, methods in found.items()}
+        print(json.dumps(value, indent=1, allow_nan=False))
+        return
+    rows = [
+        [
+            name,
+            method,
+            str(e.frames),
+            str(e.keyframes),
+            str(e.registered),
+            *_cells(e.position_m, 100),
+            *_cells(e.rotation_deg),
+        ]
+        for name, methods in found.items()
+        for method, e in methods.items()
+    ]
+    head = ["recording", "method", "frames", "keyframes", "registered"]
+    head += [f"{what} {unit}" for unit in ("cm", "°") for what in ("mean", "median", "p95", "max")]
+    print(table(head, rows))
+
+
+def export(folder: Path, *, format: str, output: Path, recording: str | None) -> list[Path]:
+    """Write the poses and say which files there are now."""
+    project = Project.open(folder)
+    with progress_bar() as report:
+        files = pipeline.export(project, format=format, output=output, recording=recording, report=report)
+    for path in files:
+        print(path)
+    print("Exported frames show people: treat them as your recordings.")
+    return files
+
+
+def _cells(summary: object, factor: float = 1.0) -> Sequence[str]:
+    values = (getattr(summary, name) for name in ("mean", "median", "p95", "max"))
+    return [f"{value * factor:.2f}" if value is not None else "–" for value in values]
+
+
+def _checked_tags(family: str | None, size_m: float | None) -> TagEntry | None:
+    if family is None:
+        if size_m is not None:
+            raise InputError(f"--tag-size {size_m:g} needs --tag-family too, e.g. --tag-family tag36h11.")
+        return None
+    if family not in FAMILIES:
+        raise InputError(f"--tag-family {family}: no such family; choose one of {', '.join(FAMILIES)}.")
+    if size_m is not None and not 0.005 <= size_m <= 5:
+        raise InputError(f"--tag-size {size_m:g}: a tag is between 0.005 and 5 metres; give its size in metres.")
+    return TagEntry(family=family, size_m=size_m)
+
+
+def _checked_recording(recording: RecordingEntry) -> list[str]:
+    if recording.truth is not None:
+        read_tum(recording.truth)
+    if recording.colmap is None and recording.colmap_times is not None:
+        raise InputError(f"{recording.colmap_times}: --colmap-times needs --colmap too.")
+    opened = open_recording(recording.path)
+    if recording.colmap is not None:
+        own_frames_of_model(opened, recording.colmap, recording.colmap_times)
+    return list(opened.notes)
+
+
+def _name_of(path: Path) -> str:
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", path.resolve().name).strip("-._")[:60]
+    if not name:
+        raise ProjectError(f"{path}: no name for the recording can be made of this; give one with --name.")
+    return name

@@ -1,0 +1,204 @@
+"""What the stages made, read for the views: typed, or None where it is not there yet; read again when it changed."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_core.alignment import Alignment
+from gazeloc_core.arrays import Floats, Ints
+from gazeloc_core.artifacts import HEADER, Artifact
+from gazeloc_core.camera import Camera
+from gazeloc_core.errors import GazelocError
+from gazeloc_core.evaluate import evaluate, match_times
+from gazeloc_core.files import read_json
+from gazeloc_core.localize.sfm import localize_sfm
+from gazeloc_core.project import Project
+from gazeloc_core.raycast import Raycaster
+from gazeloc_core.recording import Recording
+from gazeloc_core.scan import Mesh, RoomScan
+from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.stages import inputs, registration
+from gazeloc_core.stages.recording import load_keyframes
+from gazeloc_core.tag_types import TagCorners
+from gazeloc_core.trajectory import Trajectory
+from gazeloc_core.truth import read_tum
+
+T = TypeVar("T")
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameErrors:
+    """Errors of all N frames against the ground truth, NaN where there is no pose or no truth."""
+
+    position_m: Floats
+    rotation_deg: Floats
+
+
+class ProjectData:
+    """Reads of one project, remembered by content. Safe to use from several threads.
+
+    What a stage made may be damaged: then it is as if it were not there, and `say` is told the sentence, once.
+    """
+
+    def __init__(self, project: Project, say: Callable[[str], None] = _log.warning):
+        self.project = project
+        self._say = say
+        self._said: set[str] = set()
+        self._lock = threading.RLock()
+        self._known: dict[str, tuple[object, Any]] = {}
+
+    def scan(self) -> RoomScan:
+        """The scan as its file has it."""
+        return self._remember("scan", None, lambda: inputs.load_scan(self.project))
+
+    def mesh(self) -> Mesh:
+        """The scan's mesh with its colours, taken from the frames where the file has none."""
+        colored = self._read("mesh", self.project.scan_artifact("colors"), lambda: inputs.load_mesh(self.project))
+        return colored or self.scan().mesh
+
+    def raycaster(self) -> Raycaster:
+        """Rays against the scan's mesh."""
+        return self._remember("raycaster", None, lambda: inputs.load_raycaster(self.project))
+
+    def scan_tags(self) -> TagCorners | None:
+        """Tag corners on the scan."""
+        artifact = self.project.scan_artifact("corners")
+        return self._read("scan tags", artifact, lambda: inputs.load_corners(artifact.read_arrays()))
+
+    def sfm_tags(self, recording: str) -> TagCorners | None:
+        """Tag corners in the reconstruction."""
+        artifact = self.project.artifact(recording, "corners")
+        return self._read(f"{recording} tags", artifact, lambda: inputs.load_corners(artifact.read_arrays()))
+
+    def recording(self, recording: str) -> Recording:
+        """The recording as its files have it."""
+        return self._remember(f"{recording} files", None, lambda: inputs.load_recording(self.project, recording))
+
+    def camera(self, recording: str) -> Camera | None:
+        """The pinhole camera of the undistorted frames."""
+        artifact = self.project.artifact(recording, "undistorted")
+        load = lambda: inputs.load_undistorted_camera(self.project, recording)  # noqa: E731
+        return self._read(f"{recording} camera", artifact, load)
+
+    def model(self, recording: str) -> SfmModel | None:
+        """The reconstruction."""
+        artifact = self.project.artifact(recording, "reconstruction")
+        return self._read(f"{recording} model", artifact, lambda: inputs.load_model(self.project, recording))
+
+    def keyframes(self, recording: str) -> Ints | None:
+        """The frames that were to be registered."""
+        artifact = self.project.artifact(recording, "keyframes")
+        return self._read(f"{recording} keyframes", artifact, lambda: load_keyframes(self.project, recording))
+
+    def alignment(self, recording: str, key: str | None) -> Alignment | None:
+        """An alignment by its key; None for none, or where its file is damaged."""
+        if key is None:
+            return None
+        load = lambda: registration.load_alignment(self.project, recording, key)  # noqa: E731
+        return self._remember_or_say(f"{recording} alignment {key}", key, load)
+
+    def alignments(self, recording: str) -> list[Alignment]:
+        """All alignments of a recording, the oldest first; damaged files are left out."""
+        folder = self.project.alignments_folder(recording)
+        files = sorted(folder.glob("*.json"), key=lambda path: (path.stat().st_mtime_ns, path.name))
+        found = (self.alignment(recording, path.stem) for path in files)
+        return [alignment for alignment in found if alignment is not None]
+
+    def refinement(self, recording: str) -> dict[str, Any] | None:
+        """What the last refinement found, as `Refinement.to_json` wrote it."""
+        artifact = self.project.artifact(recording, "refinement")
+        load: Callable[[], dict[str, Any]] = lambda: read_json(  # noqa: E731
+            artifact.folder / "refinement.json", "a refinement"
+        )
+        return self._read(f"{recording} refinement", artifact, load)
+
+    def trajectory(self, recording: str, key: str | None) -> Trajectory | None:
+        """The poses under an alignment, by the same function as the stage `trajectory`; None without one."""
+        alignment, model, keyframes = self.alignment(recording, key), self.model(recording), self.keyframes(recording)
+        if alignment is None or model is None or keyframes is None:
+            return None
+        times = self.recording(recording).timestamp_ns
+        load = lambda: localize_sfm(times, keyframes, model, alignment.scan_from_sfm)  # noqa: E731
+        return self._remember_or_say(f"{recording} trajectory", (key, model, id(keyframes)), load)
+
+    def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
+        """The ground truth: times and `scan_from_camera`."""
+        entry = self._remember(f"{recording} entry", None, lambda: self.project.recording(recording))
+        path = entry.truth
+        return None if path is None else self._remember_or_say(f"{recording} truth", None, lambda: read_tum(path))
+
+    def true_keyframes(self, recording: str) -> RigidTransform | None:
+        """The ground truth of the keyframes; of all its times while there are no keyframes, None without a truth."""
+        truth, keyframes = self.truth(recording), self.keyframes(recording)
+        if truth is None or keyframes is None:
+            return None if truth is None else truth[1]
+        times, poses = truth
+        wanted = self.recording(recording).timestamp_ns[keyframes]
+
+        def load() -> RigidTransform | None:
+            rows = match_times(wanted, times)
+            return poses[rows[rows >= 0]] if (rows >= 0).any() else None
+
+        return self._remember(
+            f"{recording} true keyframes", _stamp(self.project.artifact(recording, "keyframes")), load
+        )
+
+    def errors(self, recording: str, key: str | None) -> FrameErrors | None:
+        """The errors of an alignment's poses against the ground truth, by frame; None without either."""
+        trajectory, truth = self.trajectory(recording, key), self.truth(recording)
+        if trajectory is None or truth is None:
+            return None
+        return self._remember_or_say(f"{recording} errors", trajectory, lambda: _frame_errors(trajectory, truth))
+
+    def _read(self, name: str, artifact: Artifact, load: Callable[[], T]) -> T | None:
+        """What `load` reads of an artifact; None where it is not there or damaged."""
+        stamp = _stamp(artifact)
+        return None if stamp is None else self._remember_or_say(name, stamp, load)
+
+    def _remember_or_say(self, name: str, content: object, load: Callable[[], T]) -> T | None:
+        """`_remember`, where a failure is remembered as None and its sentence said."""
+
+        def load_or_say() -> T | None:
+            try:
+                return load()
+            except GazelocError as error:
+                if str(error) not in self._said:
+                    self._said.add(str(error))
+                    self._say(str(error))
+                return None
+
+        return self._remember(name, content, load_or_say)
+
+    def _remember(self, name: str, content: object, load: Callable[[], T]) -> T:
+        with self._lock:
+            known = self._known.get(name)
+            if known is None or known[0] != content:
+                known = (content, load())
+                self._known[name] = known
+            value: T = known[1]
+            return value
+
+
+def _stamp(artifact: Artifact) -> tuple[int, int] | None:
+    """Tells an artifact from the next one in its place without reading it: it is replaced as a whole."""
+    try:
+        status = (artifact.folder / HEADER).stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_ino
+
+
+def _frame_errors(trajectory: Trajectory, truth: tuple[Ints, RigidTransform]) -> FrameErrors:
+    evaluation = evaluate(trajectory, *truth)
+    position, rotation = np.full(len(trajectory), np.nan), np.full(len(trajectory), np.nan)
+    position[evaluation.frame_index] = evaluation.frame_position_m
+    rotation[evaluation.frame_index] = evaluation.frame_rotation_deg
+    return FrameErrors(position, rotation)

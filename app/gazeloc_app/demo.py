@@ -1,0 +1,58 @@
+"""The demo: the sample scene as a project, kept between starts, its stages run on the first one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from gazeloc_app.app import serve
+from gazeloc_core import __version__
+from gazeloc_core.errors import GazelocError, InputError
+from gazeloc_core.files import read_json
+from gazeloc_core.hashing import FileHasher
+from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.resources import sample_scene
+
+SCENE = "studio"
+
+
+def open_demo(*, port: int = 8080) -> None:
+    """Open the app on the sample scene. What is annotated there stays between starts."""
+    project = demo_project(_folder())
+    serve(project.folder, port=port, run_everything=not project.settings.chosen)
+
+
+def demo_project(folder: Path) -> Project:
+    """The project of the sample scene in a folder, made there if it is not there yet."""
+    scene = sample_scene(SCENE)
+    target = folder / f"{SCENE}-{__version__}-{FileHasher(folder / '.hashes.json').hash_of(scene)}"
+    if (target / "project.json").is_file():
+        return Project.open(target)
+    return Project.create(target, scene_settings(scene))
+
+
+def scene_settings(scene: Path, *, with_colmap: bool = True) -> Settings:
+    """The project settings for a sample scene's folder, from its scene.json."""
+    facts = read_json(scene / "scene.json", "what a sample scene consists of")
+    try:
+        recording = RecordingEntry(
+            path=scene / facts["recording"],
+            colmap=scene / facts["colmap"] if with_colmap else None,
+            truth=scene / facts["truth"],
+        )
+        tags = TagEntry(family=facts["tag_family"], size_m=facts["tag_size_m"])
+        return Settings(scan=ScanEntry(path=scene / facts["scan"]), tags=tags, recordings={"glasses": recording})
+    except KeyError as error:
+        raise InputError.of(scene / "scene.json", f"the field {error} is missing", "write the scene anew") from error
+
+
+def _folder() -> Path:
+    base = os.environ.get("GAZELOC_DEMO") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(base) / "gazeloc"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GazelocError(
+            f"{folder}: the demo cannot be kept there ({error.strerror}); set GAZELOC_DEMO to another folder."
+        ) from error
+    return folder

@@ -1,0 +1,102 @@
+"""Panel: the clicked keypoint pairs with their residuals, and what can be done to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from viser import GuiApi
+
+from gazeloc_app import widgets
+from gazeloc_app.actions import Action, DeletePair, EnablePair, Redo, RenamePair, SelectPair, Undo
+from gazeloc_app.data import ProjectData
+from gazeloc_app.residuals import PairResidual, pair_residuals
+from gazeloc_app.state import AppState
+from gazeloc_core.keypoints import KeypointPair
+
+NEW = "(a new pair)"
+RULES = (
+    "<b>Good keypoints</b>: things that are distinct in both; the middle of a thing, not its rim "
+    "(reconstructions blur edges); far apart from each other, in all directions. Three pairs at least, six are better."
+)
+
+
+class KeypointPanel:
+    """The table of pairs, the selection, and undo and redo."""
+
+    def __init__(self, gui: GuiApi, state: AppState, data: ProjectData, dispatch: Callable[[Action], None]):
+        self._data = data
+        self._dispatch = dispatch
+        self._state = state
+        self._seen: object = None
+        gui.add_html(widgets.box(RULES))
+        self._table = gui.add_html("")
+        self._selected = gui.add_dropdown("Selected", (NEW,), hint="The next click completes this pair.")
+        self._name = gui.add_text("Name", "")
+        self._enabled = gui.add_checkbox("Counts", True, hint="Whether the pair takes part in the alignment.")
+        self._delete = gui.add_button("Delete the pair", color="red")
+        self._steps = gui.add_button_group("", ("Undo", "Redo"))
+        widgets.on_user(self._selected, lambda event: dispatch(SelectPair(self._key_of(str(event.target.value)))))
+        widgets.on_user(
+            self._name, lambda event: self._if_selected(lambda key: RenamePair(key, str(event.target.value)))
+        )
+        widgets.on_user(
+            self._enabled, lambda event: self._if_selected(lambda key: EnablePair(key, bool(event.target.value)))
+        )
+        widgets.on_user(self._delete, lambda _: self._if_selected(DeletePair), event="on_click")
+        widgets.on_user(
+            self._steps,
+            lambda event: dispatch(Undo() if event.target.value == "Undo" else Redo()),
+            event="on_click",
+        )
+        undo = gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl", icon=None)
+        redo = gui.add_command("Redo", hotkey="Y", modifier="cmd/ctrl", icon=None)
+        widgets.on_user(undo, lambda _: dispatch(Undo()), event="on_trigger")
+        widgets.on_user(redo, lambda _: dispatch(Redo()), event="on_trigger")
+
+    def render(self, state: AppState) -> None:
+        """Show the state's pairs."""
+        self._state = state
+        seen = (state.annotation, state.selected_key, state.recording, state.data_revision)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        keypoints = state.annotation.keypoints
+        residuals = pair_residuals(self._data, state)
+        rows = [_row(pair, residuals.get(pair.key), pair.key == state.selected_key) for pair in keypoints]
+        table = widgets.html_table(["", "Name", "Scan", "SfM", "cm", "px"], rows) if rows else "No pair yet."
+        widgets.set_content(self._table, widgets.box(f'<div id="gazeloc-pairs">{table}</div>'))
+        selected = keypoints.get(state.selected_key) if state.selected_key else None
+        options = (NEW, *(_label(pair) for pair in keypoints))
+        if tuple(self._selected.options) != options:
+            self._selected.options = options
+        widgets.set_value(self._selected, _label(selected) if selected else NEW)
+        for handle in (self._name, self._enabled, self._delete):
+            widgets.set_property(handle, "disabled", selected is None)
+        widgets.set_value(self._name, selected.name if selected else "")
+        widgets.set_value(self._enabled, selected.enabled if selected else True)
+
+    def _key_of(self, label: str) -> str | None:
+        return None if label == NEW else label.split(" · ")[0]
+
+    def _if_selected(self, make: Callable[[str], Action]) -> None:
+        if self._state.selected_key is not None:
+            self._dispatch(make(self._state.selected_key))
+
+
+def _label(pair: KeypointPair) -> str:
+    return f"{pair.key} · {pair.name}"
+
+
+def _row(pair: KeypointPair, residual: PairResidual | None, is_selected: bool) -> list[str]:
+    color = "inherit" if pair.enabled else widgets.MUTED
+    name = widgets.colored(pair.name, color)
+    sightings = f"{len(pair.sightings)} views" if pair.sightings else ""
+    sfm = "✓" if pair.sfm is not None else ""
+    return [
+        "▸" if is_selected else "",
+        f"<b>{name}</b>" if is_selected else name,
+        "✓" if pair.scan is not None else "–",
+        " ".join(part for part in (sfm, sightings) if part) or "–",
+        f"{100 * residual.distance_m:.1f}" if residual else "",
+        f"{residual.pixels:.0f}" if residual and residual.pixels is not None else "",
+    ]

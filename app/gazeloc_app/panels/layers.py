@@ -1,0 +1,59 @@
+"""Panel: which layers show, and their tints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from viser import GuiApi
+
+from gazeloc_app import widgets
+from gazeloc_app.actions import Action, ShowLayer, TintLayer
+from gazeloc_app.state import AppState, Layer
+
+HINTS = {
+    Layer.SCAN: "The mesh in its own colours.",
+    Layer.POINTS: "The sparse points of the glasses' reconstruction; where they stand before it is aligned is a guess.",
+    Layer.SCAN_TAGS: "Tags as the phone saw them, blue.",
+    Layer.SFM_TAGS: "Tags as the glasses saw them, orange, numbers with a prime (3′).",
+    Layer.PHONE: "The phone's cameras, blue.",
+    Layer.TRUTH: "The glasses' true poses, green, where the project was given any.",
+    Layer.ESTIMATE: "The glasses' estimated poses, red; the frame that is shown, yellow.",
+    Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, pink the selected pair.",
+    Layer.GAZE: "Where the wearer looked at the frame that is shown.",
+}
+TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
+
+
+class LayerPanel:
+    """A checkbox per layer; one colour field for the layer that is to be tinted."""
+
+    def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None]):
+        self._boxes = {}
+        for layer in Layer:
+            box = gui.add_checkbox(layer.value, True, hint=HINTS[layer])
+            widgets.on_user(box, partial(_show, dispatch, layer))
+            self._boxes[layer] = box
+        with gui.add_folder("Tint", expand_by_default=False):
+            self._which = gui.add_dropdown("Layer", tuple(layer.value for layer in TINTABLE))
+            self._color = gui.add_rgb("Colour", (255, 160, 60))
+            self._own = gui.add_button("Own colours", hint="Take the tint away.")
+        widgets.on_user(
+            self._color, lambda event: dispatch(TintLayer(Layer(self._which.value), _rgb(event.target.value)))
+        )
+        widgets.on_user(self._own, lambda _: dispatch(TintLayer(Layer(self._which.value), None)), event="on_click")
+
+    def render(self, state: AppState) -> None:
+        """Show the state's layers."""
+        for layer, box in self._boxes.items():
+            widgets.set_value(box, state.layers.is_visible(layer))
+
+
+def _show(dispatch: Callable[[Action], None], layer: Layer, event: Any) -> None:
+    dispatch(ShowLayer(layer, bool(event.target.value)))
+
+
+def _rgb(value: object) -> tuple[int, int, int]:
+    red, green, blue = (min(max(int(channel), 0), 255) for channel in value)  # type: ignore[attr-defined]
+    return red, green, blue

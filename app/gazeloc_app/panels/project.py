@@ -1,0 +1,94 @@
+"""Panel: which recording, how its stages stand, running them, and the last sentence for the user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from viser import GuiApi
+
+from gazeloc_app import tasks, widgets
+from gazeloc_app.actions import Action, StartJob
+from gazeloc_app.state import AppState
+from gazeloc_core import pipeline
+from gazeloc_core.artifacts import State
+from gazeloc_core.project import Project
+
+_COLORS = {
+    State.FRESH: widgets.GOOD,
+    State.STALE: widgets.WARNING,
+    State.MISSING: widgets.MUTED,
+    State.FAILED: widgets.BAD,
+}
+
+
+class JobBar:
+    """The running job with its progress and the cancel button, and the last notice; stays above all tabs."""
+
+    def __init__(self, gui: GuiApi, cancel: Callable[[], None]):
+        self._notice = gui.add_html("", visible=False)
+        self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._text = gui.add_html("", visible=False)
+        self._cancel = gui.add_button("Cancel", visible=False, color="gray", hint="What was there before stays.")
+        widgets.on_user(self._cancel, lambda _: cancel(), event="on_click")
+
+    def render(self, state: AppState) -> None:
+        """Show the job and the notice of the state."""
+        notice, job = state.notice, state.job
+        if notice is not None:
+            color = widgets.LEVEL_COLORS[notice.level.value]
+            widgets.set_content(self._notice, widgets.box(widgets.colored(notice.text, color)))
+        widgets.set_property(self._notice, "visible", notice is not None)
+        for handle in (self._bar, self._text, self._cancel):
+            widgets.set_property(handle, "visible", job is not None)
+        if job is not None:
+            widgets.set_value(self._bar, round(100 * job.fraction, 1))
+            text = "Cancelling …" if job.is_cancelling else f"{job.name} · {job.text}"
+            widgets.set_content(self._text, widgets.box(widgets.text(text)))
+            widgets.set_property(self._cancel, "disabled", job.is_cancelling)
+
+
+class ProjectPanel:
+    """The recording, the stages and the button that runs them."""
+
+    def __init__(
+        self,
+        gui: GuiApi,
+        project: Project,
+        state: AppState,
+        dispatch: Callable[[Action], None],
+        open_recording: Callable[[str], None],
+    ):
+        self._project = project
+        self._state = state
+        self._seen: object = None
+        self._recording = gui.add_dropdown(
+            "Recording", state.recordings, initial_value=state.recording, hint="One scan, any number of recordings."
+        )
+        widgets.on_user(self._recording, lambda event: open_recording(str(event.target.value)))
+        self._run = gui.add_button(
+            "Run everything", hint="Every stage that is missing or stale, from the files to gaze in the room."
+        )
+        widgets.on_user(
+            self._run,
+            lambda _: dispatch(StartJob("Run everything", tasks.run_all, (("recording", self._state.recording),))),
+            event="on_click",
+        )
+        self._stages = gui.add_html("")
+
+    def render(self, state: AppState) -> None:
+        """Show the state's recording and how its stages stand."""
+        self._state = state
+        widgets.set_value(self._recording, state.recording)
+        widgets.set_property(self._run, "disabled", state.job is not None)
+        seen = (state.recording, state.data_revision)
+        if seen != self._seen:
+            self._seen = seen
+            rows = [
+                [
+                    widgets.text(status.title),
+                    widgets.colored(status.state.value, _COLORS[status.state]),
+                    widgets.colored(status.reason[:160], widgets.MUTED),
+                ]
+                for status in pipeline.statuses(self._project, state.recording)
+            ]
+            widgets.set_content(self._stages, widgets.box(widgets.html_table(["Stage", "", ""], rows)))

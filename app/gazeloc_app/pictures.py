@@ -1,0 +1,61 @@
+"""The pictures of the panel “Frame” as the routes ask for them: the frame, and the render of the scan from its pose."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Any
+
+from gazeloc_app.data import ProjectData
+from gazeloc_app.render_process import RenderProcess
+from gazeloc_app.render_worker import Frame, Render, camera_text
+from gazeloc_app.state import AppState
+from gazeloc_core.errors import InputError
+from gazeloc_core.transforms import wxyz_of
+
+WIDTH_PX = 900
+"""Wide enough for the panel: more is not seen there and takes longer to scrub."""
+
+
+class Pictures:
+    """Asks the drawing process, so that of all frames that were scrubbed over only the last is drawn.
+
+    All browsers show the frame of the state. So a picture of that frame may push aside the others that wait, but a
+    slow browser's late request for an earlier frame may not push aside that one; and browsers that ask for the same
+    picture share it.
+    """
+
+    def __init__(self, data: ProjectData, process: RenderProcess, state: Callable[[], AppState]):
+        self._data, self._process, self._state = data, process, state
+        self._asked: dict[Frame | Render, Future[Any]] = {}
+
+    async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
+        """A frame, undistorted, as JPEG."""
+        del query
+        return await self._picture("frame", recording, index, Frame(recording=recording, index=index, width=WIDTH_PX))
+
+    async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
+        """The scan from the frame's pose under the alignment that `rev` names, as JPEG."""
+        self._data.project.recording(recording)
+        if not re.fullmatch("[0-9a-f]{1,64}", query.get("rev", "")):
+            raise InputError("A render is of an alignment, which `rev` names.")
+        trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._data.camera(recording)
+        pose = trajectory.pose(index) if trajectory is not None and index < len(trajectory) else None
+        if pose is None or camera is None:
+            raise InputError(f"Frame {index} has no pose, so there is no render of it.")
+        w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
+        cx, cy, cz = (float(value) for value in pose.translation)
+        job = Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=WIDTH_PX)
+        return await self._picture("render", recording, index, job)
+
+    async def _picture(self, kind: str, recording: str, index: int, job: Frame | Render) -> bytes:
+        state = self._state()
+        when = "now" if (recording, index) == (state.recording, state.frame) else "before"
+        waiting = self._asked.get(job)
+        if waiting is None or waiting.done():
+            self._asked = {other: future for other, future in self._asked.items() if not future.done()}
+            waiting = self._process.submit(job, key=f"{kind} {when}")
+            self._asked[job] = waiting
+        return bytes(await asyncio.wrap_future(waiting))

@@ -1,0 +1,86 @@
+"""The room: the scan's mesh in its true colours."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import viser
+from numpy.typing import ArrayLike
+
+from gazeloc_core.glb import WHITE, Glb, Rgb, mesh_glb
+from gazeloc_core.scan import Mesh
+
+_CLEAR_MAJORITY = 0.65
+"""Share of the mesh's area that must face the viewpoints before back sides are hidden."""
+
+
+class RoomLayer:
+    """The scan at `/scan`. Give it a mesh fit for the browser (`display_mesh`), turned by `facing` where that is known.
+
+    Never attach a click handler to its node: that costs the browser 136 ms per mouse move at 1.5 million triangles.
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str = "/scan"):
+        self._scene = scene
+        self._name = name
+        self._mesh: Mesh | None = None
+        self._glb: Glb | None = None
+        self._look: tuple[Rgb, float, bool] = (WHITE, 1.0, True)
+        self._handle: viser.GlbHandle | None = None
+        self._visible = True
+
+    def show(self, mesh: Mesh | None) -> None:
+        """Draw this mesh instead; None draws none."""
+        if mesh is self._mesh:
+            return
+        self._mesh = mesh
+        self._glb = None if mesh is None else mesh_glb(mesh)
+        self._draw()
+
+    def set_look(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> None:
+        """Tint all colours, let the room be seen through, or hide faces from behind (`two_sided` False)."""
+        look = (tint, min(max(opacity, 0.0), 1.0), two_sided)
+        if look != self._look:
+            self._look = look
+            self._draw()
+
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide the layer."""
+        self._visible = visible
+        if self._handle is not None:
+            self._handle.visible = visible
+
+    def _draw(self) -> None:
+        if self._glb is None:
+            if self._handle is not None:
+                self._handle.remove()
+                self._handle = None
+            return
+        tint, opacity, two_sided = self._look
+        self._handle = self._scene.add_glb(
+            self._name,
+            self._glb.to_bytes(tint, opacity, two_sided),
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=self._visible,
+        )
+
+
+def facing(mesh: Mesh, viewpoints: ArrayLike) -> tuple[Mesh, bool]:
+    """The mesh with its faces turned towards `viewpoints` (N, 3), from where it was scanned, and whether that is clear.
+
+    Only where it is clear may faces be hidden from behind. Every face votes with its area, by the side of it on which
+    the viewpoints' median lies.
+    """
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    towards = np.median(np.asarray(viewpoints, dtype=np.float64).reshape(-1, 3), axis=0) - (a + b + c) / 3
+    area = np.linalg.norm(normals, axis=1)
+    share = float(area[np.einsum("ij,ij->i", normals, towards) > 0].sum() / max(area.sum(), 1e-30))
+    if share >= 0.5:
+        return mesh, share >= _CLEAR_MAJORITY
+    texture = mesh.texture
+    if texture is not None:
+        texture = dataclasses.replace(texture, uv_of_corner=texture.uv_of_corner[:, ::-1])
+    return dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], texture=texture), 1 - share >= _CLEAR_MAJORITY

@@ -1,0 +1,218 @@
+"""The scene: draws the state with the layers of scene/. Each layer is touched only when what it shows has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import cv2
+import numpy as np
+import viser
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_app.data import ProjectData
+from gazeloc_app.gaze_at import gaze_in_scan
+from gazeloc_app.placement import shown_scan_from_sfm
+from gazeloc_app.render_process import RenderProcess
+from gazeloc_app.render_worker import Frame
+from gazeloc_app.scene.cloud import CloudLayer
+from gazeloc_app.scene.frames import SelectedFrameLayer
+from gazeloc_app.scene.frusta import FrustaLayer
+from gazeloc_app.scene.gaze import GazeLayer
+from gazeloc_app.scene.keypoints import KeypointsLayer
+from gazeloc_app.scene.room import RoomLayer, facing
+from gazeloc_app.scene.tags import TagsLayer
+from gazeloc_app.scene.view import set_start
+from gazeloc_app.state import AppState, Layer
+from gazeloc_core.arrays import Bytes
+from gazeloc_core.display_mesh import display_mesh
+from gazeloc_core.trajectory import Trajectory
+from gazeloc_core.transforms import Similarity
+
+GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
+SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
+WHITE = (255, 255, 255)
+BACKGROUND = (233, 236, 239)
+"""Light, but not white: holes in the scan are seen as holes, white walls as walls."""
+THUMBNAIL_PX = 320
+MAX_FRUSTA = 400
+"""More frusta of one set than this hide the room; a stride thins them out, the path shows all."""
+
+
+class SceneView:
+    """All layers, and what each of them shows."""
+
+    def __init__(self, server: viser.ViserServer, data: ProjectData, render: RenderProcess):
+        self._server, self._data, self._render = server, data, render
+        scene = server.scene
+        scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
+        self._shown: dict[str, object] = {}
+        self.front = 0
+        """Which side of the scan's faces is drawn: 1 where their normals point to, -1 the other, 0 both."""
+        self._room = RoomLayer(scene)
+        self._cloud = CloudLayer(scene)
+        self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
+        self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
+        self._phone = FrustaLayer(scene, "phone", BLUE, depth_m=0.08)
+        self._truth = FrustaLayer(scene, "truth", GREEN)
+        self._estimate = FrustaLayer(scene, "estimate", RED)
+        self._keypoints = KeypointsLayer(scene)
+        self._gaze = GazeLayer(scene)
+        self._selected = SelectedFrameLayer(scene)
+
+    def render(self, state: AppState) -> None:
+        """Draw the state."""
+        scan_from_sfm, is_aligned = shown_scan_from_sfm(self._data, state)
+        trajectory = self._data.trajectory(state.recording, state.annotation.alignment)
+        self._draw_scan(state)
+        self._draw_reconstruction(state, scan_from_sfm)
+        self._draw_tags(state, scan_from_sfm)
+        self._draw_cameras(state, trajectory if is_aligned else None)
+        self._once(
+            "keypoints",
+            (state.annotation.keypoints, state.selected_key, scan_from_sfm),
+            lambda: self._keypoints.show(state.annotation.keypoints, scan_from_sfm, state.selected_key),
+        )
+        self._draw_frame(state, trajectory)
+        self._show_and_hide(state)
+
+    def _draw_scan(self, state: AppState) -> None:
+        mesh = self._data.mesh()
+        if self._shown.get("mesh") is not mesh:
+            if "mesh" in self._shown:  # the scan got colours: the pictures of it are outdated
+                self._render.reopen()
+            self._shown["mesh"] = mesh
+            frames = self._data.scan().frames
+            places = [np.asarray(frame.scan_from_camera.translation) for frame in frames] or [mesh.bounds.mean(axis=0)]
+            displayed = display_mesh(mesh)
+            turned, is_clear = facing(displayed, places)
+            self.front = (1 if turned is displayed else -1) if is_clear else 0
+            self._room.show(turned)
+            set_start(self._server, mesh, self._data.scan().up_axis)
+            self._shown.pop("tint", None)
+        tint = state.layers.tint(Layer.SCAN)
+        self._once("tint", tint, lambda: self._room.set_look(tint or WHITE, two_sided=self.front == 0))
+
+    def _draw_reconstruction(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
+        model, tint = self._data.model(state.recording), state.layers.tint(Layer.POINTS)
+        self._once(
+            "points",
+            (model, tint),
+            lambda: self._cloud.show(
+                None if model is None else model.points, None if model is None else model.point_colors, tint
+            ),
+        )
+        if scan_from_sfm is not None:
+            self._once("place", _numbers(scan_from_sfm), lambda: self._cloud.align(scan_from_sfm))
+
+    def _draw_tags(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
+        on_scan, in_sfm = self._data.scan_tags(), self._data.sfm_tags(state.recording)
+        self._once("scan tags", on_scan, lambda: self._scan_tags.show(on_scan))
+        place = None if scan_from_sfm is None else _numbers(scan_from_sfm)
+        self._once("sfm tags", (in_sfm, place), lambda: self._sfm_tags.show(in_sfm, scan_from_sfm))
+
+    def _draw_cameras(self, state: AppState, trajectory: Trajectory | None) -> None:
+        scan, camera = self._data.scan(), self._data.camera(state.recording)
+        phone_tint = state.layers.tint(Layer.PHONE)
+        self._once(
+            "phone",
+            (scan, phone_tint),
+            lambda: self._show_frusta(
+                self._phone, _phone_poses(scan.frames), scan.frames[0].camera if scan.frames else None, phone_tint
+            ),
+        )
+        truth, truth_tint = self._data.true_keyframes(state.recording), state.layers.tint(Layer.TRUTH)
+        self._once(
+            "truth",
+            (truth, camera, truth_tint),
+            lambda: self._show_frusta(self._truth, truth, camera, truth_tint),
+        )
+        tint = state.layers.tint(Layer.ESTIMATE)
+        self._once(
+            "estimate",
+            (trajectory, camera, tint),
+            lambda: self._show_frusta(self._estimate, _registered_poses(trajectory), camera, tint),
+        )
+
+    def _show_frusta(
+        self, layer: FrustaLayer, poses: RigidTransform | None, camera: Any, tint: tuple[int, int, int] | None
+    ) -> None:
+        if camera is not None and not camera.is_pinhole:
+            camera = None
+        count = 0 if poses is None or camera is None else len(poses)
+        layer.show(poses if count else None, camera, stride=max(1, -(-count // MAX_FRUSTA)), colors=tint)
+
+    def _draw_frame(self, state: AppState, trajectory: Trajectory | None) -> None:
+        camera = self._data.camera(state.recording)
+        pose = None
+        if trajectory is not None and state.frame < len(trajectory):
+            pose = trajectory.pose(state.frame)
+        key = (state.recording, state.frame, trajectory)
+
+        def show() -> None:
+            self._selected.show(pose, camera)
+            ray = gaze_in_scan(self._data, state.recording, state.frame, trajectory)
+            self._gaze.show(*((None,) if ray is None else (ray.origin, ray.direction, ray.hit)))
+            if pose is not None:
+                job = Frame(recording=state.recording, index=state.frame, width=THUMBNAIL_PX)
+                future = self._render.submit(job, key="thumbnail")
+                future.add_done_callback(when_picture(lambda image: self._paste(key, pose, camera, image)))
+
+        self._once("frame", key, show)
+
+    def _paste(self, key: object, pose: RigidTransform, camera: Any, image: Bytes) -> None:
+        if self._shown.get("frame") == key:  # another frame may have been chosen while this one was decoded
+            self._selected.show(pose, camera, image)
+
+    def _show_and_hide(self, state: AppState) -> None:
+        layers = {
+            Layer.SCAN: (self._room,),
+            Layer.POINTS: (self._cloud,),
+            Layer.SCAN_TAGS: (self._scan_tags,),
+            Layer.SFM_TAGS: (self._sfm_tags,),
+            Layer.PHONE: (self._phone,),
+            Layer.TRUTH: (self._truth,),
+            Layer.ESTIMATE: (self._estimate, self._selected),
+            Layer.KEYPOINTS: (self._keypoints,),
+            Layer.GAZE: (self._gaze,),
+        }
+        for layer, parts in layers.items():
+            is_visible = state.layers.is_visible(layer)
+            self._once(
+                f"visible {layer}",
+                is_visible,
+                lambda parts=parts, on=is_visible: [  # type: ignore[misc]
+                    part.set_visible(on) for part in parts
+                ],
+            )
+
+    def _once(self, name: str, shown: object, draw: Callable[[], object]) -> None:
+        if name not in self._shown or self._shown[name] != shown:
+            self._shown[name] = shown
+            draw()
+
+
+def when_picture(use: Callable[[Bytes], None]) -> Callable[[Future[Any]], None]:
+    """A callback for a future of JPEG bytes that passes the picture on; a superseded or failed one is dropped."""
+
+    def done(future: Future[Any]) -> None:
+        if future.exception() is None:
+            bgr = cv2.imdecode(np.frombuffer(future.result(), np.uint8), cv2.IMREAD_COLOR)
+            use(np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8))
+
+    return done
+
+
+def _numbers(similarity: Similarity) -> tuple[float, ...]:
+    return tuple(similarity.as_matrix().ravel().tolist())
+
+
+def _phone_poses(frames: Any) -> RigidTransform | None:
+    return RigidTransform.concatenate([frame.scan_from_camera for frame in frames]) if frames else None
+
+
+def _registered_poses(trajectory: Trajectory | None) -> RigidTransform | None:
+    if trajectory is None or not trajectory.is_registered.any():
+        return None
+    return trajectory.poses(np.flatnonzero(trajectory.is_registered))

@@ -1,0 +1,131 @@
+"""What the app knows, in one frozen value: every view renders from it, and only actions (actions.py) change it.
+
+Not in here: what belongs to one browser (its camera, its pick mode), which stays on the client's handle; and what the
+stages made (meshes, points, trajectories), which is read from the project by `data.py` and named here by revision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+from gazeloc_core.keypoints import KeypointSet
+
+
+class Layer(StrEnum):
+    """What can be shown and hidden in the scene."""
+
+    SCAN = "Scan"
+    POINTS = "Reconstruction"
+    SCAN_TAGS = "Scan's tags"
+    SFM_TAGS = "Glasses' tags"
+    PHONE = "Phone"
+    TRUTH = "Ground truth"
+    ESTIMATE = "Estimate"
+    KEYPOINTS = "Keypoints"
+    GAZE = "Gaze"
+
+
+class Level(StrEnum):
+    """How much a notice matters."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence for the user, shown until the next one."""
+
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True)
+class Job:
+    """Long work that is under way, outside of the app's process: `task` (see tasks.py) with its keywords."""
+
+    name: str
+    task: Callable[..., Any]
+    keywords: tuple[tuple[str, Any], ...] = ()
+    fraction: float = 0.0
+    text: str = ""
+    is_cancelling: bool = False
+    number: int = 0
+    """Counts the jobs of a session, so that one can be told from the next of the same name."""
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """What people decide, and what undo and redo step through."""
+
+    keypoints: KeypointSet = field(default_factory=KeypointSet)
+    alignment: str | None = None
+    """The key of the alignment in force; None before the first."""
+    alignment_by_person: bool = False
+
+
+@dataclass(frozen=True)
+class LayerSettings:
+    """Which layers show, and how they are tinted (RGB; None for a layer's own colours)."""
+
+    hidden: frozenset[Layer] = frozenset()
+    tints: tuple[tuple[Layer, tuple[int, int, int]], ...] = ()
+
+    def is_visible(self, layer: Layer) -> bool:
+        """Whether a layer shows."""
+        return layer not in self.hidden
+
+    def tint(self, layer: Layer) -> tuple[int, int, int] | None:
+        """A layer's tint, None for its own colours."""
+        return dict(self.tints).get(layer)
+
+    def with_visible(self, layer: Layer, is_visible: bool) -> LayerSettings:
+        """With one layer shown or hidden."""
+        return replace(self, hidden=self.hidden - {layer} if is_visible else self.hidden | {layer})
+
+    def with_tint(self, layer: Layer, tint: tuple[int, int, int] | None) -> LayerSettings:
+        """With one layer's tint set or taken away."""
+        others = tuple(item for item in self.tints if item[0] is not layer)
+        return replace(self, tints=others if tint is None else (*others, (layer, tint)))
+
+
+MAX_UNDO = 500
+
+
+@dataclass(frozen=True)
+class AppState:
+    """Everything that is the same in all browsers."""
+
+    recordings: tuple[str, ...]
+    recording: str
+    annotation: Annotation = field(default_factory=Annotation)
+    past: tuple[Annotation, ...] = ()
+    future: tuple[Annotation, ...] = ()
+    selected_key: str | None = None
+    frame: int = 0
+    layers: LayerSettings = field(default_factory=LayerSettings)
+    job: Job | None = None
+    jobs_started: int = 0
+    notice: Notice | None = None
+    data_revision: int = 0
+    """Counts up whenever a stage finished, so that views read its artifacts anew."""
+    renderer_note: str = ""
+    """What to say about the renderer of pictures where it stands in for the usual one."""
+
+    def annotate(self, annotation: Annotation) -> AppState:
+        """With a new annotation that can be undone; the redo list is cut, as everywhere."""
+        if annotation == self.annotation:
+            return self
+        return replace(self, annotation=annotation, past=(*self.past, self.annotation)[-MAX_UNDO:], future=())
+
+    def with_keypoints(self, keypoints: KeypointSet) -> AppState:
+        """`annotate` with only the keypoints changed."""
+        return self.annotate(replace(self.annotation, keypoints=keypoints))
+
+    def noticed(self, level: Level, text: str) -> AppState:
+        """With a sentence for the user."""
+        return replace(self, notice=Notice(level, text))

@@ -1,0 +1,75 @@
+"""The app's long work, as functions for the worker process (jobs.py): each calls the pipeline and says how it went."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gazeloc_app.jobs import Outcome
+from gazeloc_app.state import Level
+from gazeloc_core import pipeline
+from gazeloc_core.progress import Report, part
+from gazeloc_core.project import Project
+from gazeloc_core.stages import registration
+
+_LEVELS = {"good": Level.INFO, "warning": Level.WARNING, "bad": Level.ERROR}
+
+
+def run_all(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """Every stage that is missing or stale, then the poses."""
+    project = Project.open(folder)
+    times = pipeline.run(project, recording=recording, report=report)
+    chosen = project.settings.chosen.get(recording)
+    seconds = sum(time.seconds for time in times)
+    return Outcome(
+        f"Everything is up to date ({seconds:.0f} s).",
+        alignment=chosen.alignment if chosen else None,
+        by_person=bool(chosen and chosen.by_person),
+    )
+
+
+def color_scan(folder: Path, report: Report) -> Outcome:
+    """The colours of a scan whose file has none."""
+    pipeline.run_stage(Project.open(folder), pipeline.stage_named("colors", of_scan=True), None, report)
+    return Outcome("The scan's file has no colours; they were taken from the phone's frames.")
+
+
+def reconstruct(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """The stages up to the reconstruction and its tags: what clicking needs."""
+    project = Project.open(folder)
+    pipeline.run(project, recording=recording, until="corners", report=report)
+    return Outcome("The reconstruction is there; click keypoints, or align by the tags.")
+
+
+def align(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """Fit the keypoints, after whatever is missing for that."""
+    project = Project.open(folder)
+    pipeline.run(project, recording=recording, until="corners", report=part(report, 0, 0.9))
+    alignment = registration.align_keypoints(project, recording, report=part(report, 0.9, 1))
+    worst = alignment.evidence.worst_level
+    residual = alignment.evidence.residual_rms_m
+    text = f"Aligned: keypoints fit to {100 * residual:.1f} cm (RMS)." if residual is not None else "Aligned."
+    if worst != "good":
+        text += " " + next(verdict.text for verdict in alignment.verdicts if verdict.level == worst)
+    return Outcome(text, _LEVELS[worst], alignment=alignment.key, by_person=True)
+
+
+def refine(folder: Path, report: Report, *, recording: str, start: str) -> Outcome:
+    """ICP from the alignment in force; put in force only if the evidence says that it is better."""
+    project = Project.open(folder)
+    refinement = registration.refine_alignment(project, recording, start=start, report=report)
+    if refinement.accepted:
+        return Outcome(f"Refined: {refinement.reason}", alignment=refinement.chosen.key, by_person=True)
+    return Outcome(f"ICP was refused: {refinement.reason}", Level.WARNING)
+
+
+def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, ...], output: str) -> Outcome:
+    """The poses in the formats asked for, each in a folder of its own below `output`."""
+    project = Project.open(folder)
+    pipeline.run_stage(project, pipeline.stage_named("trajectory"), recording, part(report, 0, 0.05))
+    pipeline.run_stage(project, pipeline.stage_named("gaze"), recording, part(report, 0.05, 0.1))
+    files = 0
+    for position, format in enumerate(formats):
+        share = part(report, 0.1 + 0.9 * position / len(formats), 0.1 + 0.9 * (position + 1) / len(formats))
+        target = Path(output).expanduser() / format
+        files += len(pipeline.export(project, format=format, output=target, recording=recording, report=share))
+    return Outcome(f"{files} files were written to {output}. Exported frames show people: treat them with care.")

@@ -1,0 +1,1 @@
+"""Writers of aligned poses and 3D gaze: one file per format."""

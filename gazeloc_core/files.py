@@ -1,0 +1,68 @@
+"""Writing files so that a crash leaves the old one or the new one, never half of either; reading JSON of users."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from gazeloc_core.errors import InputError
+
+
+def write_text_atomically(path: Path, text: str) -> None:
+    """Replace a text file in one step, flushed to disk first."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with part.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+
+
+def write_json_atomically(path: Path, value: Any) -> None:
+    """Replace a JSON file in one step; NaN and infinity are refused (they are not JSON)."""
+    write_text_atomically(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+@contextmanager
+def folder_replaced_atomically(folder: Path) -> Iterator[Path]:
+    """A new empty folder to write into that takes the place of `folder` when the block ends well.
+
+    If the block raises, the new folder goes and the old one stays as it was.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir()
+    try:
+        yield part
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
+    shutil.rmtree(old, ignore_errors=True)
+    if folder.exists():
+        folder.rename(old)
+    part.rename(folder)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def read_json(path: Path, what: str) -> Any:
+    """The value in a JSON file.
+
+    Raises:
+        InputError: if the file is missing, not UTF-8 or not JSON; `what` says what it should hold.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError.of(path, f"the file is missing; it should hold {what}", "restore it") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError.of(path, f"the file cannot be read ({error})", "restore it or its permissions") from error
+    except ValueError as error:
+        raise InputError.of(path, f"the file is not valid JSON ({error})", "restore or export it again") from error

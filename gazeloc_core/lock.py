@@ -1,0 +1,78 @@
+"""One process writes to a project at a time; a second one is told who does.
+
+The lock is the operating system's (it goes when the process goes, however it ends); the file's text only names the
+holder. A worker process that the holder started may write on the holder's behalf, so it does not lock again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from gazeloc_core.errors import ProjectLockedError
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(file: IO[str]) -> None:
+        file.seek(1 << 20)  # past the text, which others must be able to read
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+else:
+    import fcntl
+
+    def _lock(file: IO[str]) -> None:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+class WriteLock:
+    """Held from construction to `release()`; also a context manager."""
+
+    def __init__(self, path: Path):
+        """Take the lock.
+
+        Raises:
+            ProjectLockedError: if another process holds it.
+        """
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file: IO[str] | None = path.open("a+", encoding="utf-8")
+        try:
+            _lock(self._file)
+        except OSError as error:
+            holder = _holder(self._file)
+            self._file.close()
+            self._file = None
+            raise ProjectLockedError(
+                f"{path.parent}: another process is writing to this project ({holder}); close it or wait for it to end."
+            ) from error
+        self._file.seek(0)
+        self._file.truncate()
+        self._file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "command": sys.argv[:3]}))
+        self._file.flush()
+
+    def release(self) -> None:
+        """Let others write. Does nothing the second time."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def __enter__(self) -> WriteLock:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+
+def _holder(file: IO[str]) -> str:
+    file.seek(0)
+    try:
+        value = json.loads(file.read())
+        return f"process {value['pid']} on {value['host']}: {' '.join(value['command'])}"
+    except (ValueError, KeyError, TypeError):
+        return "it left no name"

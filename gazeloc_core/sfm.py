@@ -1,0 +1,305 @@
+"""Structure from motion on undistorted keyframes: pycolmap with known, fixed intrinsics.
+
+The steps: SIFT features on the CPU; pairs of frames near in time, and frames that look alike (`sfm_pairs.py`); matching
+with geometric verification; incremental mapping. Frames that stay out are then matched with all others and the mapping
+is done once more. Mapping works in a thread of its own, so that progress is shown and a cancel reaches it.
+"""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pycolmap
+
+from gazeloc_core.arrays import Ints
+from gazeloc_core.camera import Camera
+from gazeloc_core.colmap_io import read_model
+from gazeloc_core.errors import InputError, ReconstructionError
+from gazeloc_core.progress import Report, part, silent
+from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.sfm_pairs import Pairs, choose_pairs
+
+_POLL_S = 0.2
+_LEAST_IMAGES = 3
+_IMAGES_PER_CALL = 8
+_PAIRS_PER_CALL = 150
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SfmOptions:
+    """How the keyframes are reconstructed."""
+
+    max_features: int = 3000
+    """SIFT features kept per frame."""
+    peak_threshold: float = 0.0015
+    """Least contrast of a SIFT feature; lower finds more in dim frames (COLMAP's own default is 0.0067)."""
+    upsample_below_px: int = 900
+    """Frames narrower than this are searched for features at twice their size: finds more, takes four times as long."""
+    sequential_neighbours: int = 7
+    """Each frame is matched with this many following ones, and with those 8, 16, 32, ... later."""
+    similar_neighbours: int = 7
+    """Each frame is matched with this many others that look alike, wherever they are in time."""
+    exhaustive_up_to: int = 32
+    """Recordings with no more keyframes than this are matched in all pairs."""
+    threads: int = -1
+    """Threads of pycolmap; -1 for one per core."""
+    seed: int = 1
+    """Seed of every random choice."""
+
+
+def reconstruct(
+    image_folder: Path,
+    names: Sequence[str],
+    camera: Camera,
+    frame_indices: Ints,
+    work_folder: Path,
+    options: SfmOptions | None = None,
+    report: Report = silent,
+) -> list[SfmModel]:
+    """Models of the pictures `names` in `image_folder`, all of one `camera`, the one with the most pictures first.
+
+    `frame_indices` (K,) are the recording's frames of the names. `work_folder` receives the database and may be thrown
+    away afterwards; what an earlier run left there is overwritten.
+
+    Raises:
+        InputError: if a picture is missing, or fewer than three are given.
+        ReconstructionError: if no model comes out; says what was tried.
+        Cancelled: when `report` raises it.
+    """
+    options = options or SfmOptions()
+    _check_pictures(image_folder, names, frame_indices)
+    shutil.rmtree(work_folder, ignore_errors=True)
+    work_folder.mkdir(parents=True)
+    pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
+    job = _Job(image_folder, tuple(names), camera, work_folder, options)
+    job.extract(part(report, 0.0, 0.35))
+    pairs = choose_pairs(*job.descriptors(), options)
+    job.match(pairs, part(report, 0.35, 0.7))
+    models = job.map(part(report, 0.7, 0.9))
+    missing = set(range(len(names))) - job.registered(models)
+    more = {p for p in combinations(range(len(names)), 2) if set(p) & missing} - pairs
+    if more and len(missing) > 0.02 * len(names):
+        job.match(more, part(report, 0.9, 0.95))
+        again = job.map(part(report, 0.95, 1.0))
+        models = max(models, again, key=lambda found: max((len(m) for m in found), default=0))
+    if not models:
+        raise ReconstructionError(job.failure(len(pairs | more)))
+    index_of = dict(zip(names, np.asarray(frame_indices).tolist(), strict=True))
+    report(1.0, f"{len(models[0])} of {len(names)} frames registered")
+    return [_in_order_of_frames(m, np.array([index_of[name] for name in m.image_names])) for m in models]
+
+
+def _in_order_of_frames(model: SfmModel, frame_indices: Ints) -> SfmModel:
+    """The model joined to the recording's frames, its images sorted by them."""
+    order = np.argsort(frame_indices)
+    return replace(
+        model,
+        image_names=tuple(model.image_names[i] for i in order),
+        image_camera_ids=model.image_camera_ids[order],
+        sfm_from_camera=model.sfm_from_camera[order],
+        frame_indices=frame_indices[order],
+        observation_image=np.argsort(order)[model.observation_image],
+    )
+
+
+def _check_pictures(folder: Path, names: Sequence[str], frame_indices: Ints) -> None:
+    if len(names) != len(frame_indices):
+        raise InputError(f"{folder}: there are {len(names)} pictures for {len(frame_indices)} frames; undistort again.")
+    if len(names) < _LEAST_IMAGES:
+        raise InputError(
+            f"{folder}: a reconstruction needs at least {_LEAST_IMAGES} pictures, got {len(names)}; "
+            "use a longer recording."
+        )
+    for name in names:
+        if not (folder / name).is_file():
+            raise InputError.of(folder / name, "the picture is missing", "undistort the recording again")
+
+
+class _Job:
+    """One database in the work folder, and pycolmap's steps on it."""
+
+    def __init__(self, images: Path, names: tuple[str, ...], camera: Camera, work: Path, options: SfmOptions):
+        self.images, self.names, self.camera, self.work, self.options = images, names, camera, work, options
+        self.database = work / "database.db"
+
+    def extract(self, report: Report) -> None:
+        """SIFT features of all pictures into the database."""
+        extraction = pycolmap.FeatureExtractionOptions()
+        extraction.use_gpu, extraction.num_threads = False, self.options.threads
+        extraction.sift.max_num_features = self.options.max_features
+        extraction.sift.peak_threshold = self.options.peak_threshold
+        extraction.sift.first_octave = -1 if self.camera.width < self.options.upsample_below_px else 0
+        reader = pycolmap.ImageReaderOptions()
+        reader.camera_model = self.camera.model
+        reader.camera_params = ",".join(repr(value) for value in self.camera.params.tolist())
+        for start, names in _in_parts(self.names, _IMAGES_PER_CALL):
+            report(start / len(self.names), f"Features of frame {start} of {len(self.names)}")
+            pycolmap.extract_features(
+                self.database,
+                self.images,
+                list(names),
+                camera_mode=pycolmap.CameraMode.SINGLE,
+                reader_options=reader,
+                extraction_options=extraction,
+                device=pycolmap.Device.cpu,
+            )
+            reader.existing_camera_id = 1  # the first call made it
+
+    def descriptors(self) -> tuple[list[Any], int]:
+        """The SIFT descriptors of each picture in the order of `names`, (n, 128) uint8, and the seed."""
+        database = pycolmap.Database.open(self.database)
+        try:
+            ids = {image.name: image.image_id for image in database.read_all_images()}
+            return [database.read_descriptors(ids[name]).data for name in self.names], self.options.seed
+        finally:
+            database.close()
+
+    def match(self, pairs: Pairs, report: Report) -> None:
+        """Verified matches of these pairs of positions in `names` into the database."""
+        matching = pycolmap.FeatureMatchingOptions()
+        matching.use_gpu, matching.num_threads = False, self.options.threads
+        verification = pycolmap.TwoViewGeometryOptions()
+        verification.ransac.random_seed = self.options.seed
+        pairing = pycolmap.ImportedPairingOptions()
+        pairing.match_list_path = self.work / "pairs.txt"
+        for start, some in _in_parts(sorted(pairs), _PAIRS_PER_CALL):
+            report(start / len(pairs), f"Matching pair {start} of {len(pairs)}")
+            pairing.match_list_path.write_text("".join(f"{self.names[a]} {self.names[b]}\n" for a, b in some))
+            pycolmap.match_image_pairs(
+                self.database,
+                matching_options=matching,
+                pairing_options=pairing,
+                verification_options=verification,
+                device=pycolmap.Device.cpu,
+            )
+
+    def map(self, report: Report) -> list[SfmModel]:
+        """The models of incremental mapping, largest first; none where it finds no start."""
+        output = self.work / "models"
+        shutil.rmtree(output, ignore_errors=True)
+        output.mkdir()
+        registered = 2
+
+        def count_one() -> None:
+            nonlocal registered
+            registered = min(registered + 1, len(self.names))  # a frame may be tried for more than one model
+
+        def work(token: Any) -> list[Path]:
+            options = self._mapping_options()
+            found = pycolmap.incremental_mapping(
+                self.database,
+                self.images,
+                output,
+                options,
+                next_image_callback=count_one,
+                cancellation_token=token,
+            )
+            if not token.is_cancelled:
+                for key, model in found.items():
+                    _polish(model)
+                    model.write_binary(str(output / str(key)))
+            return [output / str(key) for key in found]
+
+        folders = _watched(
+            work, lambda: (registered / len(self.names), f"Placing frame {registered} of {len(self.names)}"), report
+        )
+        models = [read_model(folder) for folder in sorted(folders)]
+        return sorted((m for m in models if len(m) >= _LEAST_IMAGES), key=lambda m: (-len(m), m.image_names))
+
+    def _mapping_options(self) -> Any:
+        mapping = pycolmap.IncrementalPipelineOptions()
+        mapping.num_threads = mapping.mapper.num_threads = self.options.threads
+        mapping.random_seed = mapping.mapper.random_seed = mapping.triangulation.random_seed = self.options.seed
+        mapping.min_model_size = _LEAST_IMAGES
+        mapping.ba_refine_focal_length = mapping.ba_refine_extra_params = False
+        mapping.mapper.abs_pose_refine_focal_length = mapping.mapper.abs_pose_refine_extra_params = False
+        mapping.triangulation.ignore_two_view_tracks = False  # few features per frame: every one counts
+        mapping.mapper.init_min_num_inliers = 60
+        mapping.mapper.abs_pose_min_num_inliers = 20
+        return mapping
+
+    def registered(self, models: list[SfmModel]) -> set[int]:
+        """Positions in `names` of the pictures of the largest model."""
+        names = set(models[0].image_names) if models else set()
+        return {position for position, name in enumerate(self.names) if name in names}
+
+    def failure(self, tried: int) -> str:
+        """The sentence for when no model came out."""
+        features = int(np.median([len(d) for d in self.descriptors()[0]]))
+        database = pycolmap.Database.open(self.database)
+        try:
+            agree = database.num_verified_image_pairs()
+        finally:
+            database.close()
+        return (
+            f"{self.images}: no reconstruction came out of {len(self.names)} frames (median of {features} features per "
+            f"frame, {tried} pairs matched, {agree} of them agree); record with more light, slower turns and steps to "
+            "the side, and put more texture or tags into the room."
+        )
+
+
+def _polish(model: Any) -> None:
+    """One more bundle adjustment of a `pycolmap.Reconstruction`, with a Cauchy loss at 1 px.
+
+    COLMAP's own last one is plain least squares, in which false matches of dim frames weigh with their squares: on a
+    made-up room this took the cameras from 0.54 to 0.38 cm.
+    """
+    options = pycolmap.BundleAdjustmentOptions()
+    options.refine_focal_length = options.refine_principal_point = options.refine_extra_params = False
+    options.print_summary = False
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = 1.0
+    config = pycolmap.BundleAdjustmentConfig()
+    for image_id in model.reg_image_ids():
+        config.add_image(image_id)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    # Not pycolmap.bundle_adjustment: that one writes to the terminal whatever the log level.
+    pycolmap.create_default_bundle_adjuster(options, config, model).solve()
+    model.update_point_3d_errors()
+
+
+def _in_parts(items: Sequence[_T], size: int) -> Iterator[tuple[int, Sequence[_T]]]:
+    """`items` in runs of `size`, each with the position of its first: short calls, so that a cancel comes through.
+
+    The database itself is never asked for progress: a second copy of SQLite in this process (Python's) would break the
+    locks of pycolmap's and garble the file (tried).
+    """
+    for start in range(0, len(items), size):
+        yield start, items[start : start + size]
+
+
+def _watched(work: Callable[[Any], Any], progress: Callable[[], tuple[float, str]], report: Report) -> Any:
+    """The answer of `work(cancellation token)`, done in a thread; what `report` raises meanwhile stops it."""
+    token = pycolmap.CancellationToken()
+    answer: list[Any] = []
+    failure: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            answer.append(work(token))
+        except BaseException as error:  # handed over to the caller's thread
+            failure.append(error)
+
+    thread = threading.Thread(target=run, name="pycolmap", daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(_POLL_S)
+            fraction, text = progress()
+            report(min(max(fraction, 0.0), 1.0), text)
+    except BaseException:
+        token.cancel()
+        thread.join()
+        raise
+    if failure:
+        raise failure[0]
+    return answer[0]

@@ -1,0 +1,58 @@
+"""A sparse reconstruction as plain columns: what pycolmap found, without pycolmap's objects.
+
+The frame `sfm` is the reconstruction's own: arbitrary origin, axes and scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_core.arrays import Bytes, Floats, Ints, frozen
+from gazeloc_core.camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class SfmModel:
+    """K registered images and P points.
+
+    `cameras` by id; `image_names` (K,) and `image_camera_ids` (K,); `sfm_from_camera` K poses (COLMAP's inverted);
+    `frame_indices` (K,) the recording's frame of each image, -1 where the images were not joined to a recording;
+    `points` (P, 3) in sfm, `point_colors` (P, 3), `point_errors_px` (P,), `track_lengths` (P,);
+    observations as flat columns: `observation_point` (O,), `observation_image` (O,) and `observation_px` (O, 2).
+    """
+
+    cameras: dict[int, Camera]
+    image_names: tuple[str, ...]
+    image_camera_ids: Ints
+    sfm_from_camera: RigidTransform
+    frame_indices: Ints
+    points: Floats
+    point_colors: Bytes
+    point_errors_px: Floats
+    track_lengths: Ints
+    observation_point: Ints
+    observation_image: Ints
+    observation_px: Floats
+
+    def __post_init__(self) -> None:
+        for name in (
+            "image_camera_ids",
+            "frame_indices",
+            "track_lengths",
+            "observation_point",
+            "observation_image",
+        ):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.int64))
+        for name in ("points", "point_errors_px", "observation_px"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "point_colors", frozen(self.point_colors, np.uint8))
+
+    def __len__(self) -> int:
+        return len(self.image_names)
+
+    def camera_of(self, image: int) -> Camera:
+        """The camera of the image at position `image` (0 to K-1)."""
+        return self.cameras[int(self.image_camera_ids[image])]

@@ -1,0 +1,57 @@
+"""What a project's results are worth: errors against a ground truth, and the evidence of the alignment in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gazeloc_core.errors import GazelocError, InputError
+from gazeloc_core.evaluate import Evaluation, evaluate
+from gazeloc_core.project import Project
+from gazeloc_core.stages.registration import chosen_alignment, fresh_trajectory
+from gazeloc_core.truth import read_tum
+from gazeloc_core.user_files import about
+
+
+def evaluate_recording(project: Project, recording: str, truth: Path | None = None) -> Evaluation:
+    """The errors of a recording's trajectory against a truth file; by default the one that the project names.
+
+    Raises:
+        InputError: if there is no truth file, or its times are not the recording's.
+        ProjectError: if there is no trajectory yet, or it is of an earlier alignment.
+    """
+    path = truth or project.recording(recording).truth
+    if path is None:
+        raise InputError(f"{recording}: the project names no ground truth; give one with --truth FILE.tum.")
+    timestamp_ns, poses = read_tum(path)
+    trajectory = fresh_trajectory(project, recording)
+    with about(path):
+        return evaluate(trajectory, timestamp_ns, poses)
+
+
+def evaluate_project(
+    project: Project, *, truth: Path | None = None, recording: str | None = None
+) -> dict[str, dict[str, Evaluation]]:
+    """The errors of each recording and method; of those that have a truth, or of the one named.
+
+    Raises:
+        InputError: if no recording has a truth, or one truth is given for several recordings.
+    """
+    names = [recording] if recording is not None else list(project.settings.recordings)
+    if truth is not None and len(names) > 1:
+        raise InputError(f"{truth}: the project has {len(names)} recordings; say which one with --recording NAME.")
+    if truth is None and recording is None:
+        names = [name for name in names if project.recording(name).truth is not None]
+    if not names:
+        raise InputError(f"{project.folder}: no recording has a ground truth; give one with --truth FILE.tum.")
+    return {name: {"sfm": evaluate_recording(project, name, truth)} for name in names}
+
+
+def verdicts(project: Project, recording: str) -> list[tuple[str, str]]:
+    """What the evidence of the alignment in force means: (good | warning | bad, sentence). Empty without one."""
+    try:
+        alignment = chosen_alignment(project, recording)
+    except GazelocError:
+        return []
+    refinement = project.artifact(recording, "refinement")
+    notes = [("refinement", note) for note in refinement.header().notes] if refinement.exists else []
+    return [(verdict.level, verdict.text) for verdict in alignment.verdicts] + notes

@@ -1,0 +1,233 @@
+"""The command line as scripts depend on it: names, options, what goes to which stream, exit codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from data import CHECKOUT
+from fake_project import CLICKED, click, contents
+from gazeloc_app.cli import main
+
+from gazeloc_core import __version__
+from gazeloc_core.project import Project
+
+OPTIONS = {
+    "new": ["--scan", "--recording", "--colmap", "--truth", "--tag-family", "--tag-size"],
+    "add": ["--recording", "--name", "--truth"],
+    "run": ["--method", "--recording"],
+    "view": ["--port"],
+    "status": ["--json"],
+    "evaluate": ["--truth", "--recording", "--json"],
+    "export": ["--format", "--output"],
+    "demo": ["--port"],
+}
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(CHECKOUT / "app"), str(CHECKOUT)])}
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    """Run a command that must succeed; what it wrote to standard output."""
+    capsys.readouterr()
+    main([str(word) for word in words])
+    return capsys.readouterr().out
+
+
+def help_of(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as stop:
+        main([*words, "--help"])
+    assert stop.value.code == 0
+    return capsys.readouterr().out
+
+
+def test_help_names_every_command(capsys):
+    text = help_of(capsys)
+    assert all(command in text for command in OPTIONS)
+    assert __version__ in text
+
+
+@pytest.mark.parametrize("command", OPTIONS)
+def test_help_of_a_command_names_its_options(capsys, command: str):
+    text = help_of(capsys, command)
+    assert all(option in text for option in OPTIONS[command])
+    assert ("PROJECT" in text) == (command != "demo")
+
+
+def test_help_draws_what_the_tag_size_is(capsys):
+    text = help_of(capsys, "new")
+    rows = [row.strip("│ ") for row in text.splitlines()]
+    first = rows.index("tag36h11            tagStandard41h12")
+    assert rows[first + 1 : first + 11] == [
+        "# # # # # # # #     . . . . . . . . .",
+        "# . . . . . . #     . # # # # # # # .",
+        "# . . . . . . #     . #           # .",
+        *["# . . . . . . #     . #   . . .   # ."] * 3,
+        "# . . . . . . #     . #           # .",
+        "# # # # # # # #     . # # # # # # # .",
+        "<---- size --->     . . . . . . . . .",
+        "<- size -->",
+    ]
+
+
+def test_version(capsys):
+    assert answer(capsys, "--version") == f"gazeloc {__version__}\n"
+
+
+def test_a_project_is_made_and_added_to(capsys, home: Path):
+    words = ["new", home / "p", "--scan", home / "scan", "--recording", home / "walk", "--truth", home / "truth.tum"]
+    said = answer(capsys, *words, "--tag-family", "tag36h11", "--tag-size", "0.16")
+    assert "Recognised as 3D Scanner App" in said
+    assert "Recognised as Pupil Cloud export" in said
+    answer(capsys, "add", home / "p", "--recording", home / "pictures", "--name", "second walk")
+    settings = Project.open(home / "p").settings
+    assert settings.tags is not None
+    assert (settings.tags.family, settings.tags.size_m) == ("tag36h11", 0.16)
+    assert list(settings.recordings) == ["walk", "second walk"]
+    assert settings.recordings["walk"].truth == home / "truth.tum"
+
+
+def test_commands_leave_scan_and_recording_alone(capsys, home: Path):
+    places = [home / name for name in ("scan", "walk", "pictures")]
+    before = [contents(place) for place in places]
+    answer(capsys, "new", home / "p", "--scan", home / "scan", "--recording", home / "walk")
+    answer(capsys, "add", home / "p", "--recording", home / "pictures")
+    answer(capsys, "status", home / "p")
+    answer(capsys, "evaluate", home / "aligned")
+    answer(capsys, "export", home / "aligned", "--format", "csv", "--output", home / "out")
+    assert [contents(place) for place in places] == before
+
+
+def test_status_is_one_json_object_and_changes_nothing(capsys, home: Path):
+    before = contents(home)
+    value = json.loads(answer(capsys, "status", home / "project", "--json"))
+    assert value["project"] == str(home / "project")
+    assert [(stage["stage"], stage["state"]) for stage in value["stages"]] == [
+        ("keyframes", "fresh"),
+        ("undistorted", "fresh"),
+        ("reconstruction", "fresh"),
+        ("alignment", "missing"),
+        ("refinement", "missing"),
+        ("trajectory", "missing"),
+        ("gaze", "missing"),
+    ]
+    assert contents(home) == before
+
+
+def test_evaluate_is_one_json_object(capsys, home: Path):
+    value = json.loads(answer(capsys, "evaluate", home / "aligned", "--json"))
+    found = value["walk"]["sfm"]
+    assert (found["frames"], found["keyframes"], found["registered"]) == (12, 2, 2)
+    for name, limit in (("rotation_deg", 1e-3), ("position_m", 1e-4)):
+        assert set(found[name]) == {"mean", "median", "p95", "max"}
+        assert all(0 <= number < limit for number in found[name].values())
+
+
+def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):
+    shifted = []
+    for line in (home / "truth.tum").read_text().splitlines():
+        if not line.startswith("#"):
+            time_s, x, rest = line.split(maxsplit=2)
+            shifted.append(f"{time_s} {float(x) + 1} {rest}")
+    (home / "shifted.tum").write_text("\n".join(shifted))
+    words = ["evaluate", home / "aligned", "--truth", home / "shifted.tum", "--recording", "walk", "--json"]
+    value = json.loads(answer(capsys, *words))
+    assert value["walk"]["sfm"]["position_m"]["mean"] == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("form", "names"),
+    [
+        ("csv", ["poses.csv", "gaze3d.csv"]),
+        ("tum", ["poses.tum"]),
+        ("colmap", ["images.bin"]),
+        ("nerfstudio", ["transforms.json"]),
+    ],
+)
+def test_export_names_what_it_wrote(capsys, home: Path, form: str, names: list[str]):
+    *files, reminder = answer(
+        capsys, "export", home / "aligned", "--format", form, "--output", home / "out"
+    ).splitlines()
+    assert "show people" in reminder
+    assert all(Path(file).is_file() for file in files)
+    assert set(names) <= {Path(file).name for file in files}
+
+
+def test_export_again_replaces_its_own_files(capsys, home: Path):
+    words = ["export", home / "aligned", "--format", "csv", "--output", home / "out"]
+    assert answer(capsys, *words) == answer(capsys, *words)
+
+
+@pytest.mark.slow
+def test_run_goes_from_keypoints_to_gaze_and_then_has_nothing_to_do(capsys, home: Path):
+    project = Project.open(home / "project")
+    click(project, CLICKED)
+    said = answer(capsys, "run", project.folder, "--recording", "walk", "--method", "sfm")
+    assert "Align to the scan" in said
+    assert "walk: good: The keypoints fit" in said
+    states = json.loads(answer(capsys, "status", project.folder, "--json"))["stages"]
+    assert {stage["state"] for stage in states} == {"fresh"}
+    before = contents(home)
+    assert "Align to the scan" not in answer(capsys, "run", project.folder)
+    assert contents(home) == before
+
+
+def started(home: Path, *words: object, **options: Any) -> "subprocess.Popen[str]":
+    command = [sys.executable, "-m", "gazeloc_app", *map(str, words)]
+    return subprocess.Popen(command, text=True, env=ENVIRONMENT, cwd=home, **options)
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_run_quietly_and_keeps_what_was_done(home: Path):
+    project = Project.open(home / "project")
+    click(project, CLICKED)
+    process = started(home, "run", project.folder, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "Refine with ICP" in line:
+            break
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert err.splitlines()[-1] == "gazeloc: stopped; what was done stays."
+    assert out == ""
+    assert project.artifact("walk", "alignment").exists
+    assert not project.artifact("walk", "refinement").exists
+    assert not list(project.folder.rglob("*.part"))
+    project.lock().release()
+
+
+def test_a_reader_that_stops_reading_is_no_error(home: Path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    process = started(home, "status", home / "project", "--json", stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "absent"),
+    [
+        (["--help"], {"open3d", "pycolmap", "trimesh", "viser", "scipy", "av"}),
+        (["status", "project", "--jsn"], {"open3d", "pycolmap", "trimesh", "viser", "scipy", "av"}),
+        (["status", "project"], {"open3d", "trimesh", "viser"}),
+        (["evaluate", "aligned", "--json"], {"open3d", "trimesh", "viser"}),
+    ],
+)
+def test_what_takes_long_to_import_is_not_imported_needlessly(home: Path, words: list[str], absent: set[str]):
+    code = (
+        "import sys\nfrom gazeloc_app.cli import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "print(' '.join({name.split('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], env=ENVIRONMENT, cwd=home, capture_output=True, text=True
+    )
+    imported = set(done.stdout.splitlines()[-1].split())
+    assert "gazeloc_core" in imported
+    assert not imported & absent

@@ -1,0 +1,144 @@
+"""The worker process: progress, results and failures arrive; cancel and crashes leave an app that works on."""
+
+import multiprocessing
+import os
+import queue
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import job_tasks
+import pytest
+from gazeloc_app import jobs
+from gazeloc_app.actions import Action, JobCancelling, JobEnded, JobProgressed
+from gazeloc_app.jobs import JobRunner
+from gazeloc_app.state import Level
+
+START_S = 60.0
+"""A worker's first start imports what its tasks import."""
+
+
+class Listener:
+    """What the store would be told."""
+
+    def __init__(self) -> None:
+        self.actions: queue.Queue[Action] = queue.Queue()
+
+    def wait_for(self, kind: type[Any], fits: Callable[[Any], bool] = lambda _: True) -> Any:
+        deadline = time.monotonic() + START_S
+        while True:
+            action = self.actions.get(timeout=max(deadline - time.monotonic(), 0.01))
+            if isinstance(action, kind) and fits(action):
+                return action
+
+
+@pytest.fixture
+def listener() -> Listener:
+    return Listener()
+
+
+@pytest.fixture
+def runner(tmp_path: Path, listener: Listener) -> Iterator[JobRunner]:
+    runner = JobRunner(tmp_path, listener.actions.put)
+    yield runner
+    runner.stop()
+
+
+def run(runner: JobRunner, listener: Listener, task: Any, **keywords: Any) -> JobEnded:
+    runner.start("The job", task, **keywords)
+    ended = listener.wait_for(JobEnded)
+    assert isinstance(ended, JobEnded)
+    return ended
+
+
+def test_progress_and_result_arrive(runner: JobRunner, listener: Listener, tmp_path: Path):
+    runner.start("The job", job_tasks.succeed, alignment="abc")
+    assert listener.wait_for(JobProgressed) == JobProgressed(1.0, "almost")
+    assert listener.wait_for(JobEnded) == JobEnded(Level.WARNING, f"Done in {tmp_path.name}.", "abc", True)
+
+
+def test_one_worker_does_job_after_job(runner: JobRunner, listener: Listener):
+    first, second = (run(runner, listener, job_tasks.say_pid) for _ in range(2))
+    assert first.text == second.text != str(os.getpid())
+
+
+def test_bad_input_ends_with_its_own_sentence(runner: JobRunner, listener: Listener, tmp_path: Path):
+    ended = run(runner, listener, job_tasks.name_bad_input)
+    assert ended == JobEnded(Level.ERROR, f"{tmp_path / 'scan.obj'}: the file is empty; export it again.")
+
+
+def test_a_fault_of_ours_is_named_and_the_worker_lives_on(runner: JobRunner, listener: Listener):
+    before = run(runner, listener, job_tasks.say_pid).text
+    ended = run(runner, listener, job_tasks.stumble)
+    assert ended.level is Level.ERROR
+    assert "ZeroDivisionError: a fault of ours" in ended.text
+    assert run(runner, listener, job_tasks.say_pid).text == before
+
+
+def test_a_worker_that_dies_is_said_and_the_next_job_works(runner: JobRunner, listener: Listener):
+    before = run(runner, listener, job_tasks.say_pid).text
+    ended = run(runner, listener, job_tasks.die)
+    assert ended.level is Level.ERROR
+    assert "“The job” ended without an answer" in ended.text
+    assert run(runner, listener, job_tasks.say_pid).text != before
+
+
+def test_a_worker_killed_between_jobs_is_replaced(runner: JobRunner, listener: Listener):
+    before = int(run(runner, listener, job_tasks.say_pid).text)
+    os.kill(before, signal.SIGKILL)
+    while any(child.pid == before for child in multiprocessing.active_children()):
+        time.sleep(0.01)
+    assert int(run(runner, listener, job_tasks.say_pid).text) != before
+
+
+def test_cancel_is_answered_at_the_next_progress(runner: JobRunner, listener: Listener, tmp_path: Path):
+    before = run(runner, listener, job_tasks.say_pid).text
+    runner.start("The job", job_tasks.step)
+    listener.wait_for(JobProgressed, lambda action: action.text == "step 0")
+    asked = time.monotonic()
+    runner.cancel()
+    listener.wait_for(JobCancelling)
+    ended = listener.wait_for(JobEnded)
+    assert ended.level is Level.INFO
+    assert "was cancelled" in ended.text
+    assert time.monotonic() - asked < jobs.PATIENCE_S
+    assert run(runner, listener, job_tasks.say_pid).text == before, "nobody had to be ended"
+
+
+def test_a_task_that_does_not_listen_is_ended(
+    runner: JobRunner, listener: Listener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(jobs, "PATIENCE_S", 0.3)
+    runner.start("The job", job_tasks.be_deaf)
+    listener.wait_for(JobProgressed)
+    asked = time.monotonic()
+    runner.cancel()
+    ended = listener.wait_for(JobEnded)
+    assert 0.3 <= time.monotonic() - asked < 10
+    assert ended == JobEnded(Level.INFO, "“The job” was ended; what was there before is unchanged.")
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "deaf.pid").read_text()), 0)
+    assert run(runner, listener, job_tasks.say_pid).level is Level.INFO
+
+
+def test_cancel_without_a_job_says_nothing_and_spares_the_next(runner: JobRunner, listener: Listener):
+    runner.cancel()
+    assert listener.actions.empty()
+    assert run(runner, listener, job_tasks.succeed, alignment="abc").alignment == "abc"
+
+
+def test_there_is_one_job_at_a_time(runner: JobRunner, listener: Listener):
+    runner.start("The job", job_tasks.step)
+    with pytest.raises(RuntimeError):
+        runner.start("Another", job_tasks.say_pid)
+    runner.cancel()
+    assert "was cancelled" in listener.wait_for(JobEnded).text
+
+
+def test_stopping_the_app_ends_the_worker(runner: JobRunner, listener: Listener):
+    worker = int(run(runner, listener, job_tasks.say_pid).text)
+    runner.stop()
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker, 0)

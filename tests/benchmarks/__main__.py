@@ -1,0 +1,81 @@
+"""`make bench`: every number that the issue of this product and its README name, measured now, with its target.
+
+    python tests/benchmarks [alignment | scene | chair | app] ...
+
+Exit code 1 where a target is missed. Times are of this machine at this moment; ratios hold on noisy ones.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS.parent / "app"), str(TESTS / "e2e")]
+
+from data import SAMPLE_SCENES, SHARED  # noqa: E402
+
+Row = tuple[str, str, bool]
+STUDIO = SAMPLE_SCENES / "studio"
+
+
+def alignment(work: Path) -> list[Row]:
+    """Keypoints and ICP in a made-up room with known errors (on the sample scene: see `scene`)."""
+    from bench_alignment import bench_icp, bench_keypoints, box_room
+
+    bench = box_room()
+    return [*bench_keypoints(bench), *bench_icp(bench)]
+
+
+def whole_scene(work: Path) -> list[Row]:
+    """The sample scene from its files."""
+    from bench_scene import bench_scene
+
+    return bench_scene(STUDIO, work)
+
+
+def real_chair(work: Path) -> list[Row]:
+    """The real chair scan, where it is there."""
+    from bench_chair import bench_chair
+
+    source = SHARED / "3dscannerapp_chair" / "chair_scan"
+    if not source.is_dir():
+        return [("chair: not measured, the real recordings are not here", str(SHARED), True)]
+    return bench_chair(source, work)
+
+
+def browser_app(work: Path) -> list[Row]:
+    """The app in a headless browser."""
+    from bench_app import bench_app
+
+    return bench_app(work)
+
+
+BENCHES: dict[str, Callable[[Path], list[Row]]] = {
+    "alignment": alignment,
+    "scene": whole_scene,
+    "chair": real_chair,
+    "app": browser_app,
+}
+
+
+def main() -> int:
+    """Run the named benchmarks, or all."""
+    missed = 0
+    for name in sys.argv[1:] or list(BENCHES):
+        started = time.monotonic()
+        with tempfile.TemporaryDirectory() as work:
+            rows = BENCHES[name](Path(work))
+        print(f"\n{name} ({time.monotonic() - started:.0f} s)")
+        for what, measured, is_met in rows:
+            print(f"  {'ok    ' if is_met else 'MISSED'}  {what:<85} {measured}", flush=True)
+            missed += not is_met
+    print(f"\n{missed} targets missed." if missed else "\nAll targets met.")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,96 @@
+"""Frames are registered, interpolated or have no pose; nothing in between, nothing invented."""
+
+import numpy as np
+import pytest
+from box_room import make_room
+
+from gazeloc_core.errors import GeometryError
+from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm, within_gaps
+from gazeloc_core.transforms import rotation_angle_rad
+
+START_NS = 1_700_000_000_123_456_789
+
+
+def model_of(frame_indices):
+    """A model whose images are of these frames, in this order, and the truth of all frames."""
+    room = make_room(points=300, images=len(frame_indices))
+    return room, type(room.model)(**{**room.model.__dict__, "frame_indices": np.array(frame_indices)})
+
+
+def times(count: int, step_s: float = 0.1):
+    return START_NS + np.round(np.arange(count) * step_s * 1e9).astype(np.int64)
+
+
+def test_every_frame_has_a_row_and_its_true_status():
+    room, model = model_of([2, 5, 20, -1])
+    # 0, 1 before the first; 3, 4 between neighbours 0.3 s apart; 8 in a gap of 1.5 s; 4 a keyframe that failed.
+    trajectory = localize_sfm(times(24), np.array([2, 4, 5, 20]), model, room.scan_from_sfm)
+    expected = ["none"] * 24
+    for index, status in {2: "registered", 3: "interpolated", 4: "none", 5: "registered", 20: "registered"}.items():
+        expected[index] = status
+    assert trajectory.status.tolist() == expected
+    assert np.flatnonzero(trajectory.is_keyframe).tolist() == [2, 4, 5, 20]
+
+
+def test_registered_poses_are_those_of_the_images_whatever_their_order():
+    room, model = model_of([7, 0, 3])
+    trajectory = localize_sfm(times(8), np.array([0, 3, 7]), model, room.scan_from_sfm)
+    for image, frame in enumerate([7, 0, 3]):
+        pose, truth = trajectory.pose(frame), room.scan_from_camera[image]
+        assert pose is not None
+        np.testing.assert_allclose(pose.as_matrix(), truth.as_matrix(), atol=1e-9)
+
+
+def test_interpolated_poses_lie_between_their_neighbours_in_time():
+    room, model = model_of([0, 4])
+    stamps = np.array([0, 100, 250, 300, 400], np.int64) * 1_000_000 + START_NS
+    trajectory = localize_sfm(stamps, np.array([0, 4]), model, room.scan_from_sfm)
+    first, last = (trajectory.pose(i) for i in (0, 4))
+    whole = rotation_angle_rad(first.rotation, last.rotation)
+    for index, share in ((1, 0.25), (2, 0.625), (3, 0.75)):
+        pose = trajectory.pose(index)
+        expected = (1 - share) * first.translation + share * last.translation
+        np.testing.assert_allclose(pose.translation, expected, atol=1e-9)
+        assert rotation_angle_rad(first.rotation, pose.rotation) == pytest.approx(share * whole, rel=1e-6)
+
+
+def test_a_longer_gap_may_be_allowed():
+    room, model = model_of([0, 15])
+    arguments = (times(16), np.array([0, 15]), model, room.scan_from_sfm)
+    assert localize_sfm(*arguments).has_pose.sum() == 2
+    assert localize_sfm(*arguments, LocalizeSfmOptions(max_gap_s=1.5)).has_pose.all()
+
+
+def test_no_registered_image_gives_no_pose():
+    room, model = model_of([-1, -1])
+    assert not localize_sfm(times(5), np.array([0, 4]), model, room.scan_from_sfm).has_pose.any()
+
+
+@pytest.mark.parametrize(
+    ("frames", "keyframes", "sentence"),
+    [([0, 9], [0], "name frame 9"), ([1, 1], [0], "frame 1 twice"), ([0, 1], [7], "keyframes name frame 7")],
+)
+def test_a_model_of_another_recording_is_refused(frames, keyframes, sentence):
+    room, model = model_of(frames)
+    with pytest.raises(GeometryError, match=sentence):
+        localize_sfm(times(5), np.array(keyframes), model, room.scan_from_sfm)
+
+
+def test_within_gaps_agrees_with_its_definition():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        known = np.unique(rng.integers(0, 50, rng.integers(0, 8)))
+        at = rng.integers(-5, 55, 20)
+        expected = []
+        for t in at:
+            before, after = known[known <= t], known[known >= t]
+            ok = len(before) and len(after) and after.min() - before.max() <= 10
+            expected.append(bool(ok))
+        assert within_gaps(at, known, 10 / 1e9).tolist() == expected
+
+
+def test_poses_do_not_depend_on_the_epoch():
+    room, model = model_of([0, 4])
+    early = localize_sfm(times(5) - START_NS, np.array([0, 4]), model, room.scan_from_sfm)
+    late = localize_sfm(times(5), np.array([0, 4]), model, room.scan_from_sfm)
+    np.testing.assert_array_equal(early.centers, late.centers)

@@ -1,0 +1,205 @@
+"""The app's page in headless Chromium: waits for what is really drawn, and clicks on points of the world.
+
+It reads viser's own test hooks in the page (`__viserMutable`, `__viserTestpoints`, `__viserPointer`); that they exist
+is tested in test_scene_page.py.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from playwright.sync_api import Browser, ConsoleMessage, Page, Playwright
+
+ARTIFACTS = Path(__file__).resolve().parents[2] / "test-artifacts"
+DRAW_TIMEOUT_S = 60.0
+_FLAGS = [
+    "--headless=new",
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-sync",
+    "--no-first-run",
+    "--mute-audio",
+]
+_FAST_FLAGS = ["--use-angle=gl-egl"]
+"""Mesa instead of SwiftShader draws twice as fast; set GAZELOC_BROWSER_GL=mesa where it is installed."""
+_WORLD_TO_CLIP = """
+() => {
+  const m = window.__viserMutable;
+  m.camera.updateMatrixWorld();
+  const root = m.nodeRefFromName[''];
+  root.updateWorldMatrix(true, false);
+  const canvas = m.canvas.getBoundingClientRect();
+  return {
+    world: root.matrixWorld.elements, view: m.camera.matrixWorldInverse.elements,
+    projection: m.camera.projectionMatrix.elements,
+    left: canvas.left, top: canvas.top, width: canvas.width, height: canvas.height,
+  };
+}
+"""
+
+
+def chromium_path() -> str | None:
+    """The browser's program, None where there is none."""
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+    return next((path for name in names if (path := shutil.which(name))), None)
+
+
+def launch(playwright: Playwright, path: str) -> Browser:
+    """A browser that draws WebGL in software: the same everywhere, and without a display."""
+    flags = [flag for flag in _FLAGS if not flag.startswith("--use-angle")] + _FAST_FLAGS
+    chosen = flags if os.environ.get("GAZELOC_BROWSER_GL") == "mesa" else _FLAGS
+    return playwright.chromium.launch(executable_path=path, headless=False, args=chosen)
+
+
+class ViewerPage:
+    """One open page of the app; `errors` are what its console and scripts complained about."""
+
+    def __init__(self, page: Page):
+        self.page = page
+        self.errors: list[str] = []
+        page.on("console", self._on_console)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def open(self, address: str) -> ViewerPage:
+        """Load the app; `fixedDpr` keeps viser from lowering its resolution when drawing is slow."""
+        joiner = "&" if "?" in address else "?"
+        self.page.goto(f"{address}{joiner}fixedDpr=1")
+        self.page.wait_for_selector("canvas")
+        return self
+
+    def wait_until_drawn(self, triangles: int = 1, timeout_s: float = DRAW_TIMEOUT_S) -> ViewerPage:
+        """Wait until one frame had at least so many triangles, the camera rests and clicks are taken note of."""
+        self._wait(
+            "n => { const m = window.__viserMutable, t = window.__viserTestpoints;"
+            " return m && m.cameraControl && t && t.rendererInfo && t.rendererInfo.render.triangles >= n; }",
+            triangles,
+            timeout_s,
+        )
+        self._wait(
+            "() => { const c = window.__viserMutable.camera.matrixWorld.elements.join();"
+            " const same = window.__restingCamera === c; window.__restingCamera = c; return same; }",
+            None,
+            timeout_s,
+            polling_ms=200,
+        )
+        self._dismiss("Software WebGL rendering detected")
+        return self.settle()
+
+    def wait_for_clicks(self, timeout_s: float = DRAW_TIMEOUT_S) -> ViewerPage:
+        """Wait until the page knows that somebody listens to clicks on the scene."""
+        self._wait("() => window.__viserPointer.hasSceneClickFilter()", None, timeout_s)
+        return self
+
+    def wait_for_node(self, name: str, present: bool = True, timeout_s: float = DRAW_TIMEOUT_S) -> ViewerPage:
+        """Wait until a node of the scene is there, or gone."""
+        self._wait("([n, p]) => !!window.__viserMutable.nodeRefFromName[n] === p", [name, present], timeout_s)
+        return self.settle()
+
+    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = 20.0) -> None:
+        """Wait until something that is looked up from here is so; the page goes on meanwhile."""
+        end = time.monotonic() + timeout_s
+        while not is_so():
+            assert time.monotonic() < end, "it did not become so in time"
+            self.page.wait_for_timeout(100)
+
+    def settle(self) -> ViewerPage:
+        """Wait until two more frames have been drawn."""
+        before = self.page.evaluate(
+            "() => { window.__viserMutable.requestRender();"
+            " return window.__viserTestpoints.rendererInfo.render.frame; }"
+        )
+        self._wait(
+            "f => { window.__viserMutable.requestRender();"
+            " return window.__viserTestpoints.rendererInfo.render.frame >= f + 2; }",
+            before,
+            DRAW_TIMEOUT_S,
+        )
+        return self
+
+    def project(self, points_in_scan: Any) -> np.ndarray:
+        """Places (N, 2) of world points (N, 3) in CSS pixels of the page, first pixel centre at 0.5; NaN behind it.
+
+        From the page's own matrices, so independent of what Python believes about the camera.
+        """
+        m = self.page.evaluate(_WORLD_TO_CLIP)
+        world, view, projection = (np.reshape(m[name], (4, 4)).T for name in ("world", "view", "projection"))
+        points = np.atleast_2d(np.asarray(points_in_scan, dtype=np.float64))
+        clip = np.column_stack([points, np.ones(len(points))]) @ (projection @ view @ world).T
+        clip[clip[:, 3] <= 0] = np.nan
+        x, y = (clip[:, :2] / clip[:, 3:]).T
+        return np.column_stack([m["left"] + (x + 1) / 2 * m["width"], m["top"] + (1 - y) / 2 * m["height"]])
+
+    def click_at_point(self, point_in_scan: Any, modifiers: tuple[str, ...] = ()) -> np.ndarray:
+        """Click the pixel in which a world point (3,) is; returns that pixel's centre (2,), which the ray goes through.
+
+        A browser's pointer has whole positions, to which viser adds half a pixel.
+        """
+        pixel = np.floor(self.project(point_in_scan)[0])
+        for key in modifiers:
+            self.page.keyboard.down(key)
+        self.page.mouse.click(*pixel)
+        for key in modifiers:
+            self.page.keyboard.up(key)
+        return np.asarray(pixel + 0.5)
+
+    def canvas_pixels(self) -> np.ndarray:
+        """What the 3D view shows, (H, W, 3), without panels; one pixel per CSS pixel."""
+        self.settle()
+        url = self.page.evaluate("() => window.__viserMutable.canvas.toDataURL('image/png')")
+        data = np.frombuffer(base64.b64decode(url.partition(",")[2]), np.uint8)
+        return np.asarray(cv2.cvtColor(cv2.imdecode(data, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB))
+
+    def label_at(self, point_in_scan: Any, reach_px: int = 24) -> bool:
+        """Whether dark letters are around a world point: labels are part of the 3D view, not of the page's text."""
+        x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
+        around = self.canvas_pixels()[max(0, y - reach_px) : y + reach_px, max(0, x - reach_px) : x + reach_px]
+        return bool((around.max(axis=2) < 70).any())
+
+    def color_at(self, point_in_scan: Any) -> np.ndarray:
+        """The colour (3,) of the canvas where a world point is."""
+        x, y = self.project(point_in_scan)[0] - self._corner()
+        return self.canvas_pixels()[int(y), int(x)].astype(int)
+
+    def has_color_near(self, point_in_scan: Any, color: Any, reach_px: int = 12, tolerance: int = 60) -> bool:
+        """Whether a colour is around a world point, which a translucent label may cover."""
+        x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
+        around = self.canvas_pixels()[max(0, y - reach_px) : y + reach_px, max(0, x - reach_px) : x + reach_px]
+        return bool((np.abs(around.astype(int) - color).max(axis=2) < tolerance).any())
+
+    def save(self, name: str) -> Path:
+        """Keep a screenshot of the whole page under test-artifacts/."""
+        ARTIFACTS.mkdir(exist_ok=True)
+        path = ARTIFACTS / f"{name}.png"
+        self.page.screenshot(path=str(path))
+        return path
+
+    def _corner(self) -> tuple[float, float]:
+        m = self.page.evaluate(_WORLD_TO_CLIP)
+        return m["left"], m["top"]
+
+    def _dismiss(self, title: str) -> None:
+        """Close viser's own notice with this title, which lies over the view."""
+        notice = self.page.locator(".mantine-Notification-root").filter(has_text=title)
+        if notice.count():
+            notice.first.get_by_role("button").click()
+            notice.first.wait_for(state="detached")
+
+    def _wait(self, script: str, argument: Any, timeout_s: float, polling_ms: float = 50) -> None:
+        self.page.wait_for_function(script, arg=argument, timeout=timeout_s * 1000, polling=polling_ms)
+
+    def _on_console(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            self.errors.append(message.text)

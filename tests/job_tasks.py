@@ -1,0 +1,48 @@
+"""Tasks for the worker process of tests/app/test_jobs.py; the worker imports them by name."""
+
+import os
+import time
+from pathlib import Path
+
+from gazeloc_app.jobs import Outcome
+from gazeloc_app.state import Level
+
+from gazeloc_core.errors import InputError
+from gazeloc_core.progress import Report
+
+
+def succeed(folder: Path, report: Report, *, alignment: str) -> Outcome:
+    report(1.0, "almost")
+    return Outcome(f"Done in {folder.name}.", Level.WARNING, alignment=alignment, by_person=True)
+
+
+def step(folder: Path, report: Report) -> Outcome:
+    """Write, then work until asked to stop."""
+    for i in range(600):
+        report(i / 600, f"step {i}")
+        (folder / "steps.txt").write_text(str(i))
+        time.sleep(0.05)
+    return Outcome("Nobody stopped this.")
+
+
+def name_bad_input(folder: Path, report: Report) -> Outcome:
+    raise InputError.of(folder / "scan.obj", "the file is empty", "export it again")
+
+
+def stumble(folder: Path, report: Report) -> Outcome:
+    raise ZeroDivisionError("a fault of ours")
+
+
+def die(folder: Path, report: Report) -> Outcome:
+    os._exit(7)
+
+
+def say_pid(folder: Path, report: Report) -> Outcome:
+    return Outcome(str(os.getpid()))
+
+
+def be_deaf(folder: Path, report: Report) -> Outcome:
+    report(0.5, "not listening")
+    (folder / "deaf.pid").write_text(str(os.getpid()))
+    time.sleep(600)
+    return Outcome("Never.")
