@@ -63,7 +63,5 @@ class AppPage:
 
     def pixels_near(self, point_in_scan: Floats, color: Any, reach_px: int = 14, tolerance: int = 35) -> int:
         """How many pixels around a place have about this colour."""
-        x, y = (self.viewer.project(point_in_scan)[0] - self.viewer._corner()).astype(int)
-        shown = self.viewer.canvas_pixels().astype(int)
-        around = shown[max(0, y - reach_px) : y + reach_px, max(0, x - reach_px) : x + reach_px]
+        around = self.viewer.pixels_around(point_in_scan, reach_px)
         return int((np.abs(around - color).max(axis=2) < tolerance).sum())

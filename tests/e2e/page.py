@@ -88,15 +88,14 @@ class ViewerPage:
             triangles,
             timeout_s,
         )
-        self._wait(
-            "() => { const c = window.__viserMutable.camera.matrixWorld.elements.join();"
-            " const same = window.__restingCamera === c; window.__restingCamera = c; return same; }",
-            None,
-            timeout_s,
-            polling_ms=200,
-        )
         self._dismiss("Software WebGL rendering detected")
-        return self.settle()
+        end = time.monotonic() + timeout_s
+        view = None
+        while view != (view := self._view()):  # on a slow machine two frames may take a second
+            assert time.monotonic() < end, "the camera does not come to rest"
+            self.settle()
+            self.page.wait_for_timeout(100)
+        return self
 
     def wait_for_clicks(self, timeout_s: float = DRAW_TIMEOUT_S) -> ViewerPage:
         """Wait until the page knows that somebody listens to clicks on the scene."""
@@ -134,7 +133,7 @@ class ViewerPage:
 
         From the page's own matrices, so independent of what Python believes about the camera.
         """
-        m = self.page.evaluate(_WORLD_TO_CLIP)
+        m = self._view()
         world, view, projection = (np.reshape(m[name], (4, 4)).T for name in ("world", "view", "projection"))
         points = np.atleast_2d(np.asarray(points_in_scan, dtype=np.float64))
         clip = np.column_stack([points, np.ones(len(points))]) @ (projection @ view @ world).T
@@ -164,20 +163,26 @@ class ViewerPage:
 
     def label_at(self, point_in_scan: Any, reach_px: int = 24) -> bool:
         """Whether dark letters are around a world point: labels are part of the 3D view, not of the page's text."""
-        x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
-        around = self.canvas_pixels()[max(0, y - reach_px) : y + reach_px, max(0, x - reach_px) : x + reach_px]
-        return bool((around.max(axis=2) < 70).any())
+        return bool((self.pixels_around(point_in_scan, reach_px).max(axis=2) < 70).any())
 
     def color_at(self, point_in_scan: Any) -> np.ndarray:
         """The colour (3,) of the canvas where a world point is."""
-        x, y = self.project(point_in_scan)[0] - self._corner()
-        return self.canvas_pixels()[int(y), int(x)].astype(int)
+        return self.pixels_around(point_in_scan, 0)[0, 0]
 
     def has_color_near(self, point_in_scan: Any, color: Any, reach_px: int = 12, tolerance: int = 60) -> bool:
         """Whether a colour is around a world point, which a translucent label may cover."""
-        x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
-        around = self.canvas_pixels()[max(0, y - reach_px) : y + reach_px, max(0, x - reach_px) : x + reach_px]
-        return bool((np.abs(around.astype(int) - color).max(axis=2) < tolerance).any())
+        around = self.pixels_around(point_in_scan, reach_px)
+        return bool((np.abs(around - color).max(axis=2) < tolerance).any())
+
+    def pixels_around(self, point_in_scan: Any, reach_px: int) -> np.ndarray:
+        """The canvas (2 reach + 1, 2 reach + 1, 3) around a world point, drawn by the very view it is projected with."""
+        for _ in range(20):
+            before = self._view()
+            x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
+            pixels = self.canvas_pixels().astype(int)
+            if self._view() == before:
+                return pixels[max(0, y - reach_px) : y + reach_px + 1, max(0, x - reach_px) : x + reach_px + 1]
+        raise AssertionError("the view does not come to rest")
 
     def save(self, name: str) -> Path:
         """Keep a screenshot of the whole page under test-artifacts/."""
@@ -187,8 +192,13 @@ class ViewerPage:
         return path
 
     def _corner(self) -> tuple[float, float]:
-        m = self.page.evaluate(_WORLD_TO_CLIP)
+        m = self._view()
         return m["left"], m["top"]
+
+    def _view(self) -> dict[str, Any]:
+        """The page's own matrices, and where the 3D view lies in the page."""
+        view: dict[str, Any] = self.page.evaluate(_WORLD_TO_CLIP)
+        return view
 
     def _dismiss(self, title: str) -> None:
         """Close viser's own notice with this title, which lies over the view."""
