@@ -175,7 +175,7 @@ class ViewerPage:
         return bool((np.abs(around - color).max(axis=2) < tolerance).any())
 
     def pixels_around(self, point_in_scan: Any, reach_px: int) -> np.ndarray:
-        """The canvas (2 reach + 1, 2 reach + 1, 3) around a world point, drawn by the very view it is projected with."""
+        """The canvas (2 reach + 1, 2 reach + 1, 3) around a world point, as drawn by the view it is projected with."""
         for _ in range(20):
             before = self._view()
             x, y = (self.project(point_in_scan)[0] - self._corner()).astype(int)
