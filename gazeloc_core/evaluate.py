@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Floats, Ints, frozen
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.trajectory import PoseStatus, Trajectory
+from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import rotation_angle_rad
 
 MATCH_NS = 1_000_000
@@ -117,7 +117,7 @@ def evaluate(trajectory: Trajectory, truth_timestamp_ns: Ints, truth_poses: Rigi
     rotation_deg, position_m = np.zeros(0), np.zeros(0)
     if len(comparable):
         rotation_deg, position_m = pose_errors(trajectory.poses(comparable), truth_poses[rows[comparable]])
-    localised = np.isin(trajectory.status, [PoseStatus.REGISTERED.value, PoseStatus.TAG_ONLY.value])
+    localised = trajectory.is_localised
     counted = trajectory.is_keyframe & (rows >= 0)
     summaries = []
     for errors in (rotation_deg, position_m):

@@ -1,10 +1,11 @@
 """The project folder: one scan, any number of recordings, what people annotated, and what the stages made.
 
     PROJECT/
-      project.json                     what belongs to the project (paths, tags) and which alignment is chosen
+      project.json                     what belongs to the project (paths, tags), the alignment and method chosen
       annotations/<recording>.json     clicked keypoints
       scan/<stage>/                    artifacts of the scan
       recordings/<recording>/<stage>/  artifacts of a recording
+      recordings/<recording>/<method>/<stage>/  what one method made of it: poses, gaze
       recordings/<recording>/alignments/<key>.json   immutable, named by their content
 
 Reading needs nothing; whoever writes holds the project's `WriteLock` (lock.py). The scan and the recordings stay where
@@ -25,6 +26,7 @@ from gazeloc_core.files import read_json, write_json_atomically
 from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.lock import WriteLock
+from gazeloc_core.methods import Method
 
 FORMAT = "gazeloc-project"
 VERSION = 1
@@ -74,6 +76,8 @@ class Settings:
     tags: TagEntry | None = None
     recordings: dict[str, RecordingEntry] = field(default_factory=dict)
     chosen: dict[str, Chosen] = field(default_factory=dict)
+    methods: dict[str, Method] = field(default_factory=dict)
+    """The method whose poses a recording is shown and exported with, where a person chose one."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +180,15 @@ class Project:
         others = {name: value for name, value in settings.chosen.items() if name != recording}
         self.save(replace(settings, chosen=others if chosen is None else {**others, recording: chosen}))
 
+    def method(self, recording: str) -> Method:
+        """The method whose poses a recording is shown and exported with."""
+        return self.settings.methods.get(recording, Method.SFM)
+
+    def choose_method(self, recording: str, method: Method) -> None:
+        """Show and export a recording with another method's poses from now on."""
+        settings = self.settings
+        self.save(replace(settings, methods={**settings.methods, recording: method}))
+
     def scan_artifact(self, stage: str) -> Artifact:
         """The place of a stage's result about the scan."""
         return Artifact(self.folder / "scan" / stage)
@@ -183,6 +196,10 @@ class Project:
     def artifact(self, recording: str, stage: str) -> Artifact:
         """The place of a stage's result about a recording."""
         return Artifact(self.folder / "recordings" / recording / stage)
+
+    def result(self, recording: str, method: Method, stage: str) -> Artifact:
+        """The place of what one method made of a recording."""
+        return Artifact(self.folder / "recordings" / recording / method.value / stage)
 
     def alignments_folder(self, recording: str) -> Path:
         """Where a recording's immutable alignments are."""
@@ -249,6 +266,7 @@ class Project:
                 name: {"alignment": chosen.alignment, "by_person": chosen.by_person}
                 for name, chosen in settings.chosen.items()
             },
+            "methods": {name: method.value for name, method in settings.methods.items()},
         }
 
     def _settings_from_json(self, value: dict[str, Any]) -> Settings:
@@ -271,6 +289,7 @@ class Project:
                 name: Chosen(alignment=chosen["alignment"], by_person=chosen["by_person"])
                 for name, chosen in value["chosen"].items()
             },
+            methods={name: Method(method) for name, method in value.get("methods", {}).items()},
         )
 
     def _required(self, text: str) -> Path:

@@ -95,6 +95,11 @@ class Trajectory:
         """(N,) whether each frame was registered itself, not interpolated."""
         return np.asarray(self.status == PoseStatus.REGISTERED.value)
 
+    @property
+    def is_localised(self) -> Bools:
+        """(N,) whether each frame was localised by what it shows itself: registered, or by its tags."""
+        return np.isin(self.status, [PoseStatus.REGISTERED.value, PoseStatus.TAG_ONLY.value])
+
     def pose(self, index: int) -> RigidTransform | None:
         """`scan_from_camera` of one frame, None where it has no pose."""
         if not PoseStatus(str(self.status[index])).has_pose:

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 from gazeloc_app.state import Annotation, AppState, Job, Layer, Level
 from gazeloc_core.keypoints import KeypointPair, Point, Sighting
+from gazeloc_core.methods import Method
 
 
 class Action(Protocol):
@@ -196,6 +197,30 @@ class ChooseAlignment:
 
 
 @dataclass(frozen=True)
+class ChooseMethod:
+    """A person wants to see and export another method's poses."""
+
+    method: Method
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return state.annotate(replace(state.annotation, method=self.method))
+
+
+@dataclass(frozen=True)
+class CompareMethod:
+    """A method's poses shall show beside those of the chosen one, or not."""
+
+    method: Method
+    is_shown: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        compared = state.compared | {self.method} if self.is_shown else state.compared - {self.method}
+        return replace(state, compared=compared)
+
+
+@dataclass(frozen=True)
 class OpenRecording:
     """Another recording was opened, with what people decided about it so far."""
 
@@ -209,6 +234,7 @@ class OpenRecording:
         return replace(
             AppState(state.recordings, self.recording, self.annotation),
             layers=state.layers,
+            compared=state.compared,
             data_revision=state.data_revision + 1,
             renderer_note=state.renderer_note,
             jobs_started=state.jobs_started,

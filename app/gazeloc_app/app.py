@@ -27,6 +27,7 @@ from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
+from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.project import JobBar, ProjectPanel
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
@@ -118,17 +119,19 @@ class App:
             keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
         with tabs.add_tab("Align"):
             alignment_panel = AlignmentPanel(gui, self.data, dispatch)
+        with tabs.add_tab("Methods"):
+            method_panel = MethodPanel(gui, self.data, dispatch)
         with tabs.add_tab("Layers"):
             layer_panel = LayerPanel(gui, dispatch)
         with tabs.add_tab("Export"):
-            export_panel = ExportPanel(gui, self.project.folder / "export", dispatch)
+            export_panel = ExportPanel(gui, self.project.folder / "export", self.data, dispatch)
         side = gui.add_panel()
         with side.add_tab("Frame"):
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
         side.dock_left()
         side.set_width(430)
-        panels = (job_bar, project_panel, keypoint_panel, alignment_panel, layer_panel, export_panel, frame_panel)
-        for panel in panels:
+        main = (project_panel, keypoint_panel, alignment_panel, method_panel, layer_panel, export_panel)
+        for panel in (job_bar, *main, frame_panel):
             self.store.add_view(panel.render)
 
     def _routes(self) -> Routes:
@@ -198,17 +201,20 @@ class App:
             chosen = Chosen(alignment=annotation.alignment, by_person=annotation.alignment_by_person)
         if self.project.settings.chosen.get(recording) != chosen:
             self.project.choose(recording, chosen)
+        if self.project.method(recording) is not annotation.method:
+            self.project.choose_method(recording, annotation.method)
 
     def _show_first_pose(self, before: AppState, after: AppState) -> None:
         """A recording often begins before its first pose: start where there is something to compare."""
-        is_new = after.annotation.alignment != before.annotation.alignment or before.recording != after.recording
+        shown = [(state.recording, state.annotation.alignment, state.annotation.method) for state in (before, after)]
+        is_new = shown[0] != shown[1]
         if is_new and after.frame == 0:
             self._go_to_first_pose(after)
 
     def _go_to_first_pose(self, state: AppState) -> None:
-        trajectory = self.data.trajectory(state.recording, state.annotation.alignment)
-        if trajectory is not None and trajectory.is_registered.any():
-            self.store.dispatch(ShowFrame(int(np.flatnonzero(trajectory.is_registered)[0])))
+        trajectory = self.data.trajectory(state.recording, self.data.poses_key(state.recording, state.annotation))
+        if trajectory is not None and trajectory.is_localised.any():
+            self.store.dispatch(ShowFrame(int(np.flatnonzero(trajectory.is_localised)[0])))
 
     def _start_job(self, before: AppState, after: AppState) -> None:
         del before
@@ -245,10 +251,10 @@ def _first_state(project: Project) -> AppState:
 
 def _annotation(project: Project, recording: str) -> Annotation:
     chosen = project.settings.chosen.get(recording)
-    keypoints = project.keypoints(recording)
+    annotation = Annotation(project.keypoints(recording), method=project.method(recording))
     if chosen is None:
-        return Annotation(keypoints)
-    return Annotation(keypoints, chosen.alignment, chosen.by_person)
+        return annotation
+    return replace(annotation, alignment=chosen.alignment, alignment_by_person=chosen.by_person)
 
 
 def _sources(project: Project) -> Sources:

@@ -153,7 +153,7 @@ class Browser:
 
     def _pick_cloud(self, origin: Floats, direction: Floats) -> Action:
         state = self._state()
-        model, (scan_from_sfm, _) = self._data.model(state.recording), shown_scan_from_sfm(self._data, state)
+        model, scan_from_sfm = self._data.model(state.recording), shown_scan_from_sfm(self._data, state)
         if model is None or scan_from_sfm is None:
             return Notify(Level.WARNING, "There is no reconstruction yet; run the stages first.")
         found = picking.pick_cloud(scan_from_sfm.apply(model.points), origin, direction, self._tolerance())
@@ -187,10 +187,10 @@ class Browser:
 
     def _pick_camera(self, origin: Floats, direction: Floats) -> Action | None:
         state = self._state()
-        trajectory = self._data.trajectory(state.recording, state.annotation.alignment)
-        if trajectory is None or not trajectory.is_registered.any():
+        trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
+        if trajectory is None or not trajectory.is_localised.any():
             return None
-        frames = np.flatnonzero(trajectory.is_registered)
+        frames = np.flatnonzero(trajectory.is_localised)
         poses = trajectory.poses(frames)
         forward = poses.rotation.as_matrix()[:, :, 2]
         found = picking.pick_frustum(

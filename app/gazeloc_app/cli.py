@@ -137,7 +137,7 @@ def run(project: Project, *, method: str = "sfm", recording: OptionalName = None
 
     Args:
         project: The project folder.
-        method: How frames are localised.
+        method: How frames are localised: sfm, sfm-paper, tags, tags-paper or global.
         recording: Only this recording; by default all.
     """
     from gazeloc_app import commands
@@ -191,7 +191,9 @@ def evaluate(
 
 
 @deferred
-def export(project: Project, *, format: str, output: Path, recording: OptionalName = None) -> None:
+def export(
+    project: Project, *, format: str, output: Path, recording: OptionalName = None, method: OptionalName = None
+) -> None:
     """Write the aligned poses (and with csv the gaze in 3D) for other programs.
 
     Args:
@@ -199,10 +201,11 @@ def export(project: Project, *, format: str, output: Path, recording: OptionalNa
         format: csv, tum, colmap or nerfstudio.
         output: The folder to write to; several recordings get a folder each.
         recording: Only this recording; by default all.
+        method: Whose poses; by default the method chosen in the app, else sfm.
     """
     from gazeloc_app import commands
 
-    commands.export(project, format=format, output=output, recording=recording)
+    commands.export(project, format=format, output=output, recording=recording, method=method)
 
 
 @deferred

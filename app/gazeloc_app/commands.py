@@ -11,6 +11,7 @@ from pathlib import Path
 from gazeloc_app.terminal import progress_bar, table
 from gazeloc_core import pipeline
 from gazeloc_core.errors import InputError, ProjectError
+from gazeloc_core.methods import method_named
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.stages.recording import own_frames_of_model
@@ -69,9 +70,9 @@ def add(folder: Path, *, name: str | None, recording: RecordingEntry) -> None:
 
 def run(folder: Path, *, method: str, recording: str | None) -> None:
     """Run the stages with a progress bar, and say how long each took and what the alignment is worth."""
-    project = Project.open(folder)
+    project, how = Project.open(folder), method_named(method)
     with project.lock(), progress_bar() as report:
-        times = pipeline.run(project, method=method, recording=recording, report=report)
+        times = pipeline.run(project, method=how, recording=recording, report=report)
     total = sum(time.seconds for time in times) or 1.0
     rows = [
         [time.recording or "scan", time.title, f"{time.seconds:.1f} s", f"{100 * time.seconds / total:.0f} %"]
@@ -80,7 +81,7 @@ def run(folder: Path, *, method: str, recording: str | None) -> None:
     ]
     print(table(["of", "stage", "time", "share"], rows))
     for name in [recording] if recording else project.settings.recordings:
-        for level, text in pipeline.verdicts(project, name):
+        for level, text in pipeline.verdicts(project, name, how):
             print(f"{name}: {level}: {text}")
 
 
@@ -91,7 +92,8 @@ def status(folder: Path, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps({"project": str(project.folder), "stages": [asdict(item) for item in found]}, indent=1))
         return
-    print(table(["of", "stage", "state", ""], [[s.recording or "scan", s.title, s.state, s.reason] for s in found]))
+    rows = [[s.recording or "scan", s.method or "", s.title, s.state, s.reason] for s in found]
+    print(table(["of", "method", "stage", "state", ""], rows))
 
 
 def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json: bool) -> None:
@@ -120,11 +122,11 @@ def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json
     print(table(head, rows))
 
 
-def export(folder: Path, *, format: str, output: Path, recording: str | None) -> list[Path]:
+def export(folder: Path, *, format: str, output: Path, recording: str | None, method: str | None) -> list[Path]:
     """Write the poses and say which files there are now."""
-    project = Project.open(folder)
+    project, how = Project.open(folder), None if method is None else method_named(method)
     with progress_bar() as report:
-        files = pipeline.export(project, format=format, output=output, recording=recording, report=report)
+        files = pipeline.export(project, format=format, output=output, recording=recording, method=how, report=report)
     for path in files:
         print(path)
     print("Exported frames show people: treat them as your recordings.")

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_app.state import Annotation
 from gazeloc_core.alignment import Alignment
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.artifacts import HEADER, Artifact
@@ -19,6 +20,7 @@ from gazeloc_core.errors import GazelocError
 from gazeloc_core.evaluate import evaluate, match_times
 from gazeloc_core.files import read_json
 from gazeloc_core.localize.sfm import localize_sfm
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
@@ -120,8 +122,29 @@ class ProjectData:
         )
         return self._read(f"{recording} refinement", artifact, load)
 
+    def poses_key(self, recording: str, annotation: Annotation, method: Method | None = None) -> str | None:
+        """Names the poses of a method, by default of the one that is shown; None where there are none.
+
+        Those of `sfm` are named by the alignment's key, those of others by `method@revision`.
+        """
+        method = method or annotation.method
+        if method is Method.SFM:
+            return annotation.alignment
+        stamp = _stamp(self.project.result(recording, method, "trajectory"))
+        return None if stamp is None else f"{method}@{stamp[0]:x}-{stamp[1]:x}"
+
     def trajectory(self, recording: str, key: str | None) -> Trajectory | None:
-        """The poses under an alignment, by the same function as the stage `trajectory`; None without one."""
+        """The poses of a key (see `poses_key`), of a method's the newest.
+
+        Those under an alignment are made here by the function of the stage itself, so that a choice shows at once.
+        """
+        if key is None or "@" not in key:
+            return self._aligned_trajectory(recording, key)
+        method = method_of(key)
+        artifact = self.project.result(recording, method, "trajectory")
+        return self._read(f"{recording} {method}", artifact, lambda: inputs.load_trajectory(artifact.read_arrays()))
+
+    def _aligned_trajectory(self, recording: str, key: str | None) -> Trajectory | None:
         alignment, model, keyframes = self.alignment(recording, key), self.model(recording), self.keyframes(recording)
         if alignment is None or model is None or keyframes is None:
             return None
@@ -152,11 +175,13 @@ class ProjectData:
         )
 
     def errors(self, recording: str, key: str | None) -> FrameErrors | None:
-        """The errors of an alignment's poses against the ground truth, by frame; None without either."""
+        """The errors of poses (see `poses_key`) against the ground truth, by frame; None without either."""
         trajectory, truth = self.trajectory(recording, key), self.truth(recording)
         if trajectory is None or truth is None:
             return None
-        return self._remember_or_say(f"{recording} errors", trajectory, lambda: _frame_errors(trajectory, truth))
+        return self._remember_or_say(
+            f"{recording} errors {method_of(key)}", trajectory, lambda: _frame_errors(trajectory, truth)
+        )
 
     def _read(self, name: str, artifact: Artifact, load: Callable[[], T]) -> T | None:
         """What `load` reads of an artifact; None where it is not there or damaged."""
@@ -185,6 +210,11 @@ class ProjectData:
                 self._known[name] = known
             value: T = known[1]
             return value
+
+
+def method_of(key: str | None) -> Method:
+    """The method whose poses a key names (see `ProjectData.poses_key`)."""
+    return Method(key.partition("@")[0]) if key is not None and "@" in key else Method.SFM
 
 
 def _stamp(artifact: Artifact) -> tuple[int, int] | None:

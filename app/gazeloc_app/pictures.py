@@ -8,15 +8,17 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from gazeloc_app.data import ProjectData
+from gazeloc_app.data import ProjectData, method_of
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Frame, Render, camera_text
 from gazeloc_app.state import AppState
 from gazeloc_core.errors import InputError
+from gazeloc_core.methods import Method
 from gazeloc_core.transforms import wxyz_of
 
 WIDTH_PX = 900
 """Wide enough for the panel: more is not seen there and takes longer to scrub."""
+_KEY = re.compile(rf"[0-9a-f]{{1,64}}|({'|'.join(Method)})@[0-9a-f-]{{1,64}}")
 
 
 class Pictures:
@@ -37,10 +39,10 @@ class Pictures:
         return await self._picture("frame", recording, index, Frame(recording=recording, index=index, width=WIDTH_PX))
 
     async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
-        """The scan from the frame's pose under the alignment that `rev` names, as JPEG."""
+        """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG."""
         self._data.project.recording(recording)
-        if not re.fullmatch("[0-9a-f]{1,64}", query.get("rev", "")):
-            raise InputError("A render is of an alignment, which `rev` names.")
+        if not _KEY.fullmatch(query.get("rev", "")):
+            raise InputError("A render is of poses, which `rev` names.")
         trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._data.camera(recording)
         pose = trajectory.pose(index) if trajectory is not None and index < len(trajectory) else None
         if pose is None or camera is None:
@@ -48,7 +50,8 @@ class Pictures:
         w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
         cx, cy, cz = (float(value) for value in pose.translation)
         job = Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=WIDTH_PX)
-        return await self._picture("render", recording, index, job)
+        kind = f"render {method_of(query.get('rev'))}"  # methods side by side do not push each other aside
+        return await self._picture(kind, recording, index, job)
 
     async def _picture(self, kind: str, recording: str, index: int, job: Frame | Render) -> bytes:
         state = self._state()

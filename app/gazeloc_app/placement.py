@@ -19,15 +19,15 @@ from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.transforms import Similarity
 
 
-def shown_scan_from_sfm(data: ProjectData, state: AppState) -> tuple[Similarity | None, bool]:
-    """Where the reconstruction is drawn, and whether that is an alignment; None without a reconstruction."""
+def shown_scan_from_sfm(data: ProjectData, state: AppState) -> Similarity | None:
+    """Where the reconstruction is drawn: by the alignment in force, else a likely place; None without one."""
     alignment = data.alignment(state.recording, state.annotation.alignment)
     if alignment is not None:
-        return alignment.scan_from_sfm, True
+        return alignment.scan_from_sfm
     model = data.model(state.recording)
     if model is None:
-        return None, False
-    return likely_scan_from_sfm(model, data.mesh(), data.scan().up_axis), False
+        return None
+    return likely_scan_from_sfm(model, data.mesh(), data.scan().up_axis)
 
 
 @lru_cache(maxsize=4)

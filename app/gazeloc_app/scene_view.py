@@ -26,11 +26,21 @@ from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.arrays import Bytes
+from gazeloc_core.camera import Camera
 from gazeloc_core.display_mesh import display_mesh
+from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
 
 GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
+METHOD_COLORS = {
+    Method.SFM: (130, 60, 200),
+    Method.SFM_PAPER: (240, 140, 0),
+    Method.TAGS: (0, 150, 150),
+    Method.TAGS_PAPER: (130, 90, 50),
+    Method.GLOBAL: (215, 60, 175),
+}
+"""Of methods that are compared with the chosen one, which is always red."""
 SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
 WHITE = (255, 255, 255)
 BACKGROUND = (233, 236, 239)
@@ -57,18 +67,21 @@ class SceneView:
         self._phone = FrustaLayer(scene, "phone", BLUE, depth_m=0.08)
         self._truth = FrustaLayer(scene, "truth", GREEN)
         self._estimate = FrustaLayer(scene, "estimate", RED)
+        self._compared = {
+            method: FrustaLayer(scene, f"methods/{method}", METHOD_COLORS[method], depth_m=0.09) for method in Method
+        }
         self._keypoints = KeypointsLayer(scene)
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
 
     def render(self, state: AppState) -> None:
         """Draw the state."""
-        scan_from_sfm, is_aligned = shown_scan_from_sfm(self._data, state)
-        trajectory = self._data.trajectory(state.recording, state.annotation.alignment)
+        scan_from_sfm = shown_scan_from_sfm(self._data, state)
+        trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
         self._draw_scan(state)
         self._draw_reconstruction(state, scan_from_sfm)
         self._draw_tags(state, scan_from_sfm)
-        self._draw_cameras(state, trajectory if is_aligned else None)
+        self._draw_cameras(state, trajectory)
         self._once(
             "keypoints",
             (state.annotation.keypoints, state.selected_key, scan_from_sfm),
@@ -132,8 +145,21 @@ class SceneView:
         self._once(
             "estimate",
             (trajectory, camera, tint),
-            lambda: self._show_frusta(self._estimate, _registered_poses(trajectory), camera, tint),
+            lambda: self._show_frusta(self._estimate, _localised_poses(trajectory), camera, tint),
         )
+
+        self._draw_compared(state, camera)
+
+    def _draw_compared(self, state: AppState, camera: Camera | None) -> None:
+        for method, layer in self._compared.items():
+            is_shown = method in state.compared and method is not state.annotation.method
+            key = self._data.poses_key(state.recording, state.annotation, method) if is_shown else None
+            poses = _localised_poses(self._data.trajectory(state.recording, key)) if key is not None else None
+            self._once(
+                f"compared {method}",
+                (state.recording, key, camera),
+                lambda layer=layer, poses=poses: self._show_frusta(layer, poses, camera, None),  # type: ignore[misc]
+            )
 
     def _show_frusta(
         self, layer: FrustaLayer, poses: RigidTransform | None, camera: Any, tint: tuple[int, int, int] | None
@@ -173,7 +199,7 @@ class SceneView:
             Layer.SFM_TAGS: (self._sfm_tags,),
             Layer.PHONE: (self._phone,),
             Layer.TRUTH: (self._truth,),
-            Layer.ESTIMATE: (self._estimate, self._selected),
+            Layer.ESTIMATE: (self._estimate, self._selected, *self._compared.values()),
             Layer.KEYPOINTS: (self._keypoints,),
             Layer.GAZE: (self._gaze,),
         }
@@ -212,7 +238,7 @@ def _phone_poses(frames: Any) -> RigidTransform | None:
     return RigidTransform.concatenate([frame.scan_from_camera for frame in frames]) if frames else None
 
 
-def _registered_poses(trajectory: Trajectory | None) -> RigidTransform | None:
-    if trajectory is None or not trajectory.is_registered.any():
+def _localised_poses(trajectory: Trajectory | None) -> RigidTransform | None:
+    if trajectory is None or not trajectory.is_localised.any():
         return None
-    return trajectory.poses(np.flatnonzero(trajectory.is_registered))
+    return trajectory.poses(np.flatnonzero(trajectory.is_localised))

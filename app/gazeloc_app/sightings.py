@@ -16,7 +16,7 @@ from gazeloc_core.triangulation import triangulate_sightings
 def frame_pose(data: ProjectData, state: AppState, frame: int) -> RigidTransform | None:
     """Where a registered frame's camera is drawn (`scan_from_camera`); None for a frame that is not registered."""
     model, image = data.model(state.recording), image_of_frame(data, state.recording, frame)
-    scan_from_sfm, _ = shown_scan_from_sfm(data, state)
+    scan_from_sfm = shown_scan_from_sfm(data, state)
     if model is None or image is None or scan_from_sfm is None:
         return None
     return scan_from_sfm.compose_pose(model.sfm_from_camera[image])

@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from gazeloc_core.keypoints import KeypointSet
+from gazeloc_core.methods import Method
 
 
 class Layer(StrEnum):
@@ -66,6 +67,8 @@ class Annotation:
     alignment: str | None = None
     """The key of the alignment in force; None before the first."""
     alignment_by_person: bool = False
+    method: Method = Method.SFM
+    """Whose poses are shown and exported."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,8 @@ class AppState:
     selected_key: str | None = None
     frame: int = 0
     layers: LayerSettings = field(default_factory=LayerSettings)
+    compared: frozenset[Method] = frozenset()
+    """Methods whose poses show in the scene beside those of the method that was chosen."""
     job: Job | None = None
     jobs_started: int = 0
     notice: Notice | None = None

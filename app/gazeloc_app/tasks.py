@@ -7,6 +7,7 @@ from pathlib import Path
 from gazeloc_app.jobs import Outcome
 from gazeloc_app.state import Level
 from gazeloc_core import pipeline
+from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
 from gazeloc_core.stages import registration
@@ -14,14 +15,14 @@ from gazeloc_core.stages import registration
 _LEVELS = {"good": Level.INFO, "warning": Level.WARNING, "bad": Level.ERROR}
 
 
-def run_all(folder: Path, report: Report, *, recording: str) -> Outcome:
-    """Every stage that is missing or stale, then the poses."""
+def run_all(folder: Path, report: Report, *, recording: str, method: Method = Method.SFM) -> Outcome:
+    """Every stage of a method that is missing or stale, up to the gaze in the room."""
     project = Project.open(folder)
-    times = pipeline.run(project, recording=recording, report=report)
+    times = pipeline.run(project, method=method, recording=recording, report=report)
     chosen = project.settings.chosen.get(recording)
     seconds = sum(time.seconds for time in times)
     return Outcome(
-        f"Everything is up to date ({seconds:.0f} s).",
+        f"Everything for the method {method} is up to date ({seconds:.0f} s).",
         alignment=chosen.alignment if chosen else None,
         by_person=bool(chosen and chosen.by_person),
     )
@@ -65,8 +66,9 @@ def refine(folder: Path, report: Report, *, recording: str, start: str) -> Outco
 def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, ...], output: str) -> Outcome:
     """The poses in the formats asked for, each in a folder of its own below `output`."""
     project = Project.open(folder)
-    pipeline.run_stage(project, pipeline.stage_named("trajectory"), recording, part(report, 0, 0.05))
-    pipeline.run_stage(project, pipeline.stage_named("gaze"), recording, part(report, 0.05, 0.1))
+    method = project.method(recording)
+    pipeline.run_stage(project, pipeline.stage_named("trajectory", method=method), recording, part(report, 0, 0.05))
+    pipeline.run_stage(project, pipeline.stage_named("gaze", method=method), recording, part(report, 0.05, 0.1))
     files = 0
     for position, format in enumerate(formats):
         share = part(report, 0.1 + 0.9 * position / len(formats), 0.1 + 0.9 * (position + 1) / len(formats))

@@ -6,13 +6,17 @@ from pathlib import Path
 
 from gazeloc_core.errors import GazelocError, InputError
 from gazeloc_core.evaluate import Evaluation, evaluate
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
-from gazeloc_core.stages.registration import chosen_alignment, fresh_trajectory
+from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
+from gazeloc_core.stages.registration import chosen_alignment
 from gazeloc_core.truth import read_tum
 from gazeloc_core.user_files import about
 
 
-def evaluate_recording(project: Project, recording: str, truth: Path | None = None) -> Evaluation:
+def evaluate_recording(
+    project: Project, recording: str, truth: Path | None = None, method: Method = Method.SFM
+) -> Evaluation:
     """The errors of a recording's trajectory against a truth file; by default the one that the project names.
 
     Raises:
@@ -23,18 +27,19 @@ def evaluate_recording(project: Project, recording: str, truth: Path | None = No
     if path is None:
         raise InputError(f"{recording}: the project names no ground truth; give one with --truth FILE.tum.")
     timestamp_ns, poses = read_tum(path)
-    trajectory = fresh_trajectory(project, recording)
+    trajectory = fresh_trajectory(project, recording, method)
     with about(path):
         return evaluate(trajectory, timestamp_ns, poses)
 
 
 def evaluate_project(
     project: Project, *, truth: Path | None = None, recording: str | None = None
-) -> dict[str, dict[str, Evaluation]]:
-    """The errors of each recording and method; of those that have a truth, or of the one named.
+) -> dict[str, dict[Method, Evaluation]]:
+    """The errors of each recording and method that has fresh poses; of those that have a truth, or of the one named.
 
     Raises:
         InputError: if no recording has a truth, or one truth is given for several recordings.
+        ProjectError: if a recording has no fresh poses by any method.
     """
     names = [recording] if recording is not None else list(project.settings.recordings)
     if truth is not None and len(names) > 1:
@@ -43,11 +48,22 @@ def evaluate_project(
         names = [name for name in names if project.recording(name).truth is not None]
     if not names:
         raise InputError(f"{project.folder}: no recording has a ground truth; give one with --truth FILE.tum.")
-    return {name: {"sfm": evaluate_recording(project, name, truth)} for name in names}
+    return {
+        name: {method: evaluate_recording(project, name, truth, method) for method in _evaluated(project, name)}
+        for name in names
+    }
 
 
-def verdicts(project: Project, recording: str) -> list[tuple[str, str]]:
-    """What the evidence of the alignment in force means: (good | warning | bad, sentence). Empty without one."""
+def _evaluated(project: Project, recording: str) -> list[Method]:
+    """The methods whose poses are fresh; the recording's own method where none is, whose error then says why."""
+    return fresh_methods(project, recording) or [project.method(recording)]
+
+
+def verdicts(project: Project, recording: str, method: Method = Method.SFM) -> list[tuple[str, str]]:
+    """What the evidence of a method's result means: (good | warning | bad, sentence). Empty without a result."""
+    if method is not Method.SFM:
+        artifact = project.result(recording, method, "trajectory")
+        return [("warning", note) for note in artifact.header().notes] if artifact.exists else []
     try:
         alignment = chosen_alignment(project, recording)
     except GazelocError:

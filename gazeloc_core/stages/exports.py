@@ -15,17 +15,27 @@ from gazeloc_core.export.gaze3d_csv import write_gaze3d_csv
 from gazeloc_core.export.nerfstudio import registered_frames, write_nerfstudio
 from gazeloc_core.export.poses_csv import write_poses_csv
 from gazeloc_core.export.tum import write_tum
+from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
-from gazeloc_core.stages.registration import chosen_alignment, fresh_trajectory, gaze_inputs
+from gazeloc_core.stages.gaze import gaze_inputs
+from gazeloc_core.stages.poses import fresh_trajectory, scan_from_model
 from gazeloc_core.undistort import Undistorter
 
 
 def export(
-    project: Project, *, format: str, output: Path, recording: str | None = None, report: Report = silent
+    project: Project,
+    *,
+    format: str,
+    output: Path,
+    recording: str | None = None,
+    method: Method | None = None,
+    report: Report = silent,
 ) -> list[Path]:
     """Write the poses of one or all recordings; several recordings get a folder each. The files written.
+
+    Without `method` each recording is exported with the one that it is shown with.
 
     Raises:
         InputError: if the format is unknown, or the place cannot be written to or holds another program's files.
@@ -41,16 +51,16 @@ def export(
         project.recording(name)
         folder = output if len(names) == 1 else output / name
         share = part(report, position / len(names), (position + 1) / len(names))
-        files += FORMATS[format](project, name, folder, share)
+        files += FORMATS[format](project, name, method or project.method(name), folder, share)
     report(1.0, "exported")
     return files
 
 
-def _csv(project: Project, recording: str, folder: Path, report: Report) -> list[Path]:
+def _csv(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
     report(0.1, "writing poses.csv")
-    trajectory = fresh_trajectory(project, recording)
-    gaze = project.artifact(recording, "gaze")
-    state, reason = gaze.state(gaze_inputs(project, recording))
+    trajectory = fresh_trajectory(project, recording, method)
+    gaze = project.result(recording, method, "gaze")
+    state, reason = gaze.state(gaze_inputs(project, recording, method))
     if state is not State.FRESH:
         raise ProjectError(f"{recording}: the gaze is {state.value} ({reason}); run `gazeloc run` first.")
     files = write_poses_csv(trajectory, folder / "poses.csv")
@@ -60,19 +70,25 @@ def _csv(project: Project, recording: str, folder: Path, report: Report) -> list
     return files
 
 
-def _tum(project: Project, recording: str, folder: Path, report: Report) -> list[Path]:
+def _tum(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
     report(0.1, "writing poses.tum")
-    return write_tum(fresh_trajectory(project, recording), folder / "poses.tum")
+    return write_tum(fresh_trajectory(project, recording, method), folder / "poses.tum")
 
 
-def _colmap(project: Project, recording: str, folder: Path, report: Report) -> list[Path]:
+def _colmap(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
     report(0.1, "writing the COLMAP model")
-    scan_from_sfm = chosen_alignment(project, recording).scan_from_sfm
+    if not method.has_model:
+        raise InputError(
+            f"--format colmap: the method {method} makes no reconstruction of {recording}; choose csv, tum or "
+            "nerfstudio, or a method that does."
+        )
+    fresh_trajectory(project, recording, method)
+    scan_from_sfm = scan_from_model(project, recording, method)
     return write_colmap(inputs.load_model(project, recording), scan_from_sfm, folder)
 
 
-def _nerfstudio(project: Project, recording: str, folder: Path, report: Report) -> list[Path]:
-    trajectory = fresh_trajectory(project, recording)
+def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
+    trajectory = fresh_trajectory(project, recording, method)
     opened = inputs.load_recording(project, recording)
     undistorter = Undistorter(opened.camera, inputs.load_undistorted_camera(project, recording))
     wanted = registered_frames(trajectory)
@@ -84,7 +100,7 @@ def _nerfstudio(project: Project, recording: str, folder: Path, report: Report) 
     return write_nerfstudio(trajectory, undistorter.target, folder, undistorted=pictures(), report=report)
 
 
-FORMATS: dict[str, Callable[[Project, str, Path, Report], list[Path]]] = {
+FORMATS: dict[str, Callable[[Project, str, Method, Path, Report], list[Path]]] = {
     "csv": _csv,
     "tum": _tum,
     "colmap": _colmap,

@@ -1,4 +1,4 @@
-"""Stages that bring scan and recording together: alignment, refinement, poses in the scan, gaze in the scan.
+"""Stages of the method `sfm` that bring scan and reconstruction together: alignment and refinement.
 
 Alignments are kept for ever, named by their content; `project.json` says which one is in force. A run puts its own
 outcome in force only where no person has chosen.
@@ -9,18 +9,13 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from gazeloc_core.alignment import Alignment, AlignOptions, align
-from gazeloc_core.artifacts import State
 from gazeloc_core.correspondences import Correspondences, gather
 from gazeloc_core.errors import GeometryError, ProjectError
 from gazeloc_core.files import read_json, write_json_atomically
-from gazeloc_core.gaze import GazeInScan, GazeOptions, cast_gaze
-from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Chosen, Project
 from gazeloc_core.refine import Refinement, RefineOptions, refine
 from gazeloc_core.stages import inputs
-from gazeloc_core.stages.recording import load_keyframes
-from gazeloc_core.trajectory import Trajectory
 
 
 def save_alignment(project: Project, recording: str, alignment: Alignment) -> None:
@@ -191,90 +186,3 @@ def chosen_alignment(project: Project, recording: str) -> Alignment:
     if chosen is None:
         raise ProjectError(f"{recording}: no alignment is in force; run `gazeloc run`, or align in the app.")
     return load_alignment(project, recording, chosen.alignment)
-
-
-def place_trajectory(
-    project: Project, recording: str, options: LocalizeSfmOptions | None = None, report: Report = silent
-) -> Trajectory:
-    """Put the reconstruction's camera poses into the scan by the alignment in force."""
-    options = options or LocalizeSfmOptions()
-    report(0.1, "placing the cameras")
-    opened = inputs.load_recording(project, recording)
-    trajectory = localize_sfm(
-        opened.timestamp_ns,
-        load_keyframes(project, recording),
-        inputs.load_model(project, recording),
-        chosen_alignment(project, recording).scan_from_sfm,
-        options,
-    )
-    project.artifact(recording, "trajectory").write_arrays(
-        inputs.trajectory_arrays(trajectory),
-        options=asdict(options),
-        inputs=trajectory_inputs(project, recording),
-        stats={
-            "frames": len(trajectory),
-            "keyframes": int(trajectory.is_keyframe.sum()),
-            "registered": int(trajectory.is_registered.sum()),
-            "with a pose": int(trajectory.has_pose.sum()),
-        },
-    )
-    return trajectory
-
-
-def fresh_trajectory(project: Project, recording: str) -> Trajectory:
-    """The poses in the scan by the alignment in force.
-
-    Raises:
-        ProjectError: if there are none, or they are of an earlier alignment or reconstruction.
-    """
-    artifact = project.artifact(recording, "trajectory")
-    state, reason = artifact.state(trajectory_inputs(project, recording))
-    if state is not State.FRESH:
-        raise ProjectError(f"{recording}: the poses are {state.value} ({reason}); run `gazeloc run` first.")
-    return inputs.load_trajectory(artifact.read_arrays())
-
-
-def trajectory_inputs(project: Project, recording: str) -> dict[str, str]:
-    """The hashes that the poses in the scan depend on."""
-    chosen = project.settings.chosen.get(recording)
-    return {
-        "keyframes": project.artifact(recording, "keyframes").header().content,
-        "reconstruction": project.artifact(recording, "reconstruction").header().content,
-        "alignment": chosen_alignment(project, recording).key if chosen is None else chosen.alignment,
-    }
-
-
-def cast_gaze_rays(
-    project: Project, recording: str, options: GazeOptions | None = None, report: Report = silent
-) -> GazeInScan | None:
-    """Cast every gaze sample into the scan; a recording without gaze gives None, and an artifact that says so."""
-    options = options or GazeOptions()
-    opened = inputs.load_recording(project, recording)
-    artifact = project.artifact(recording, "trajectory")
-    trajectory = inputs.load_trajectory(artifact.read_arrays())
-    if opened.gaze is None:
-        project.artifact(recording, "gaze").write_arrays(
-            {},
-            options=asdict(options),
-            inputs=gaze_inputs(project, recording),
-            notes=("The recording has no gaze.",),
-            stats={"samples": 0},
-        )
-        return None
-    gaze = cast_gaze(opened, trajectory, inputs.load_raycaster(project), options, report)
-    project.artifact(recording, "gaze").write_arrays(
-        inputs.gaze_arrays(gaze),
-        options=asdict(options),
-        inputs=gaze_inputs(project, recording),
-        stats={"samples": len(gaze), **gaze.counts()},
-    )
-    return gaze
-
-
-def gaze_inputs(project: Project, recording: str) -> dict[str, str]:
-    """The hashes that the gaze in the scan depends on."""
-    return {
-        "scan": inputs.scan_hash(project),
-        "recording": inputs.recording_hash(project, recording),
-        "trajectory": project.artifact(recording, "trajectory").header().content,
-    }

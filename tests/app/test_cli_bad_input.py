@@ -13,6 +13,7 @@ from bad_input import change_json, cut, into_folder, remove, write
 from fake_project import CLICKED, click, contents
 from gazeloc_app.cli import main
 
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 
 Prepare = Callable[[Path], list[Any]]
@@ -329,7 +330,7 @@ def _(home: Path) -> list[Any]:
 
 @case("results of an earlier alignment", r"walk: the poses are stale .*; run `gazeloc run` first")
 def _(home: Path) -> list[Any]:
-    artifact = Project.open(home / "aligned").artifact("walk", "trajectory")
+    artifact = Project.open(home / "aligned").result("walk", Method.SFM, "trajectory")
     header = json.loads((artifact.folder / "header.json").read_text())
     header["inputs"]["alignment"] = "another"
     (artifact.folder / "header.json").write_text(json.dumps(header))

@@ -14,6 +14,7 @@ from gazeloc_app.demo import scene_settings
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
 from gazeloc_core.camera import Camera
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs, registration
 from gazeloc_core.truth import read_tum
@@ -66,7 +67,7 @@ def test_keyframes_follow_the_rules(project: Project):
 
 
 def test_gaze_meets_the_scan_where_the_wearer_looked(project: Project):
-    gaze = inputs.load_gaze(project.artifact("glasses", "gaze").read_arrays())
+    gaze = inputs.load_gaze(project.result("glasses", Method.SFM, "gaze").read_arrays())
     with (STUDIO / "truth" / "gaze3d.csv").open() as file:
         rows = list(csv.reader(file))
     head, body = rows[0], rows[1:]
@@ -109,7 +110,7 @@ def test_exports_agree_with_each_other(project: Project, tmp_path: Path):
     for name in ("csv", "tum", "nerfstudio"):
         assert pipeline.export(project, format=name, output=tmp_path / name)
     times, poses = read_tum(tmp_path / "tum" / "poses.tum")
-    trajectory = inputs.load_trajectory(project.artifact("glasses", "trajectory").read_arrays())
+    trajectory = inputs.load_trajectory(project.result("glasses", Method.SFM, "trajectory").read_arrays())
     rows = np.flatnonzero(trajectory.has_pose)
     assert times.tolist() == trajectory.timestamp_ns[rows].tolist()
     assert np.abs(poses.translation - trajectory.centers[rows]).max() < 1e-6

@@ -9,6 +9,7 @@ from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
 from gazeloc_app.actions import Action, Notify, StartJob
+from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState, Level
 
 FORMATS = {
@@ -22,9 +23,10 @@ FORMATS = {
 class ExportPanel:
     """Formats, a folder on the computer that runs GazeLoc, and the button."""
 
-    def __init__(self, gui: GuiApi, folder: Path, dispatch: Callable[[Action], None]):
+    def __init__(self, gui: GuiApi, folder: Path, data: ProjectData, dispatch: Callable[[Action], None]):
         self._recording = ""
-        self._has_alignment = False
+        self._has_poses = False
+        self._data = data
         self._dispatch = dispatch
         self._boxes = {
             name: gui.add_checkbox(label, name == "csv", hint=hint) for name, (label, hint) in FORMATS.items()
@@ -37,14 +39,14 @@ class ExportPanel:
     def render(self, state: AppState) -> None:
         """Remember what would be exported."""
         self._recording = state.recording
-        self._has_alignment = state.annotation.alignment is not None
+        self._has_poses = self._data.poses_key(state.recording, state.annotation) is not None
         widgets.set_property(self._button, "disabled", state.job is not None)
 
     def _export(self) -> None:
         formats = tuple(name for name, box in self._boxes.items() if box.value)
         output = str(self._folder.value).strip()
-        if not self._has_alignment:
-            self._dispatch(Notify(Level.WARNING, "There are no poses to export yet; align first."))
+        if not self._has_poses:
+            self._dispatch(Notify(Level.WARNING, "There are no poses to export yet; align, or run the method first."))
         elif not formats or not output:
             self._dispatch(Notify(Level.WARNING, "Choose at least one format, and a folder."))
         else:

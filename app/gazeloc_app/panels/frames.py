@@ -69,7 +69,8 @@ class FramePanel:
     def render(self, state: AppState) -> None:
         """Show the state's frame."""
         self._state = state
-        seen = (state.recording, state.frame, state.annotation.alignment, state.data_revision, state.renderer_note)
+        key = self._data.poses_key(state.recording, state.annotation)
+        seen = (state.recording, state.frame, key, state.data_revision, state.renderer_note)
         if seen == self._seen:
             return
         self._seen = seen
@@ -78,7 +79,7 @@ class FramePanel:
         widgets.set_property(self._slider, "max", max(last, 1))
         frame = min(state.frame, last)
         widgets.set_value(self._slider, frame)
-        trajectory = self._data.trajectory(state.recording, state.annotation.alignment)
+        trajectory = self._data.trajectory(state.recording, key)
         has_pose = trajectory is not None and trajectory.pose(frame) is not None
         widgets.set_property(self._look, "disabled", image_of_frame(self._data, state.recording, frame) is None)
         widgets.set_content(self._comparison, self._comparison_html(state, frame, has_pose))
@@ -92,14 +93,14 @@ class FramePanel:
         widgets.set_content(self._facts, widgets.box("<br>".join(widgets.text(fact) for fact in facts if fact)))
 
     def _comparison_html(self, state: AppState, frame: int, has_pose: bool) -> str:
-        name, revision = state.recording, state.annotation.alignment or "none"
+        name, revision = state.recording, self._data.poses_key(state.recording, state.annotation) or "none"
         camera = self._data.camera(name)
         gaze = gaze_in_frame(self._data, name, frame, camera)
         url = f"/frames/{quote(name)}/{frame}.jpg?rev={self._revision}"
         values = {
             "FRAME_URL": url,
             "BEFORE_URL": self._before,
-            "RENDER_URL": f"/renders/{quote(name)}/{frame}.jpg?rev={revision}" if has_pose else "",
+            "RENDER_URL": f"/renders/{quote(name)}/{frame}.jpg?rev={quote(revision)}" if has_pose else "",
             "ASPECT": f"{camera.width}/{camera.height}" if camera else "1/1",
             "GAZE_X": f"{100 * gaze[0]:.3f}" if gaze else "-50",
             "GAZE_Y": f"{100 * gaze[1]:.3f}" if gaze else "-50",
@@ -113,7 +114,7 @@ class FramePanel:
         return content
 
     def _error_text(self, state: AppState, frame: int) -> str:
-        errors = self._data.errors(state.recording, state.annotation.alignment)
+        errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
         if errors is None or not np.isfinite(errors.position_m[frame]):
             return ""
         return f"Against the ground truth: {100 * errors.position_m[frame]:.1f} cm, {errors.rotation_deg[frame]:.2f}°"

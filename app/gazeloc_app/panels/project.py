@@ -68,11 +68,8 @@ class ProjectPanel:
         self._run = gui.add_button(
             "Run everything", hint="Every stage that is missing or stale, from the files to gaze in the room."
         )
-        widgets.on_user(
-            self._run,
-            lambda _: dispatch(StartJob("Run everything", tasks.run_all, (("recording", self._state.recording),))),
-            event="on_click",
-        )
+        self._dispatch = dispatch
+        widgets.on_user(self._run, lambda _: self._run_method(), event="on_click")
         self._stages = gui.add_html("")
 
     def render(self, state: AppState) -> None:
@@ -80,7 +77,7 @@ class ProjectPanel:
         self._state = state
         widgets.set_value(self._recording, state.recording)
         widgets.set_property(self._run, "disabled", state.job is not None)
-        seen = (state.recording, state.data_revision)
+        seen = (state.recording, state.annotation.method, state.data_revision)
         if seen != self._seen:
             self._seen = seen
             rows = [
@@ -92,3 +89,7 @@ class ProjectPanel:
                 for status in pipeline.statuses(self._project, state.recording)
             ]
             widgets.set_content(self._stages, widgets.box(widgets.html_table(["Stage", "", ""], rows)))
+
+    def _run_method(self) -> None:
+        keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
+        self._dispatch(StartJob("Run everything", tasks.run_all, keywords))

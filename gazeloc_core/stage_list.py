@@ -1,0 +1,184 @@
+"""The method's stages as a list: what runs, what it depends on, and which methods need it.
+
+scan       colors ─ tags ─ corners ───────────────────────────┐
+recording  keyframes ─ undistorted ┬ tags ─────────┬ corners ─┴ alignment ─ refinement ─ trajectory ─ gaze
+                                   └ reconstruction ┘
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from gazeloc_core.artifacts import Artifact
+from gazeloc_core.methods import Method
+from gazeloc_core.progress import Report
+from gazeloc_core.project import Project
+from gazeloc_core.stages import gaze, inputs, poses, recording, registration, scan
+
+Run = Callable[[Project, str, Report], object]
+Inputs = Callable[[Project, str], Mapping[str, str]]
+ALL = frozenset(Method)
+WITH_TAGS = ALL - {Method.GLOBAL}
+WITH_MODEL = frozenset(method for method in Method if method.has_model)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """One stage: how it runs, what it depends on, who needs it, and its usual share of the time."""
+
+    name: str
+    title: str
+    run: Run
+    inputs: Inputs
+    methods: frozenset[Method] = ALL
+    """The methods that need it."""
+    of_method: Method | None = None
+    """The method whose own result it makes; None where methods share it."""
+    of_scan: bool = False
+    weight: float = 1.0
+    is_needed: Callable[[Project], bool] = lambda _: True
+
+    def artifact(self, project: Project, name: str) -> Artifact:
+        """The place of its result."""
+        if self.of_scan:
+            return project.scan_artifact(self.name)
+        if self.of_method is not None:
+            return project.result(name, self.of_method, self.name)
+        return project.artifact(name, self.name)
+
+
+def _has_tags(project: Project) -> bool:
+    return project.settings.tags is not None
+
+
+def _needs_colors(project: Project) -> bool:
+    return not inputs.load_scan(project).mesh.has_colors and bool(inputs.load_scan(project).frames_with_images)
+
+
+SFM = frozenset({Method.SFM})
+_SHARED: tuple[Stage, ...] = (
+    Stage(
+        name="colors",
+        title="Colour the scan",
+        of_scan=True,
+        weight=4,
+        run=lambda project, _, report: scan.color_scan(project, report),
+        inputs=lambda project, _: scan.color_inputs(project),
+        is_needed=_needs_colors,
+    ),
+    Stage(
+        name="tags",
+        title="Find tags in the phone's frames",
+        methods=WITH_TAGS,
+        of_scan=True,
+        weight=4,
+        run=lambda project, _, report: scan.detect_scan_tags(project, report=report),
+        inputs=lambda project, _: scan.tag_inputs(project),
+        is_needed=_has_tags,
+    ),
+    Stage(
+        name="corners",
+        title="Put tags on the scan",
+        methods=frozenset({Method.SFM, Method.TAGS}),
+        of_scan=True,
+        run=lambda project, _, report: scan.map_tags(project, report=report),
+        inputs=lambda project, _: scan.corner_inputs(project),
+        is_needed=_has_tags,
+    ),
+    Stage(
+        name="keyframes",
+        title="Choose keyframes",
+        weight=10,
+        run=lambda project, name, report: recording.find_keyframes(project, name, report=report),
+        inputs=recording.keyframe_inputs,
+    ),
+    Stage(
+        name="undistorted",
+        title="Undistort keyframes",
+        weight=4,
+        run=lambda project, name, report: recording.undistort(project, name, report=report),
+        inputs=recording.undistort_inputs,
+    ),
+    Stage(
+        name="tags",
+        title="Find tags in the glasses' frames",
+        methods=WITH_TAGS,
+        weight=30,
+        run=lambda project, name, report: recording.detect_recording_tags(project, name, report=report),
+        inputs=recording.tag_inputs,
+        is_needed=_has_tags,
+    ),
+    Stage(
+        name="reconstruction",
+        title="Reconstruct the keyframes",
+        methods=WITH_MODEL,
+        weight=100,
+        run=lambda project, name, report: recording.reconstruct_keyframes(project, name, report=report),
+        inputs=recording.reconstruction_inputs,
+    ),
+    Stage(
+        name="corners",
+        title="Triangulate tags",
+        methods=SFM,
+        run=lambda project, name, report: recording.triangulate_tags(project, name, report=report),
+        inputs=recording.corner_inputs,
+        is_needed=_has_tags,
+    ),
+    Stage(
+        name="alignment",
+        title="Align to the scan",
+        methods=SFM,
+        weight=2,
+        run=lambda project, name, report: registration.align_keypoints(project, name, report=report),
+        inputs=registration.alignment_inputs,
+    ),
+    Stage(
+        name="refinement",
+        title="Refine with ICP",
+        methods=SFM,
+        weight=10,
+        run=lambda project, name, report: registration.refine_alignment(project, name, report=report),
+        inputs=registration.refinement_inputs,
+    ),
+)
+
+
+def _poses_and_gaze(method: Method, place: Run, depends: Inputs) -> tuple[Stage, ...]:
+    return (
+        Stage(
+            name="trajectory",
+            title="Put the poses into the scan",
+            methods=frozenset({method}),
+            of_method=method,
+            run=place,
+            inputs=depends,
+        ),
+        Stage(
+            name="gaze",
+            title="Cast gaze into the scan",
+            methods=frozenset({method}),
+            of_method=method,
+            weight=2,
+            run=lambda project, name, report: gaze.cast_gaze_rays(project, name, method, report=report),
+            inputs=partial(gaze.gaze_inputs, method=method),
+        ),
+    )
+
+
+STAGES: tuple[Stage, ...] = (
+    *_SHARED,
+    *_poses_and_gaze(
+        Method.SFM,
+        lambda project, name, report: poses.place_sfm(project, name, report=report),
+        poses.sfm_inputs,
+    ),
+)
+
+
+def stage_named(name: str, *, of_scan: bool = False, method: Method = Method.SFM) -> Stage:
+    """One stage of a method."""
+    return next(
+        stage for stage in STAGES if stage.name == name and stage.of_scan is of_scan and method in stage.methods
+    )
