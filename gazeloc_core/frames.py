@@ -78,7 +78,7 @@ class VideoFrames:
         if not path.is_file():
             raise InputError.of(path, "the scene video is missing", "export the recording again")
         try:
-            with av.open(str(path)) as container:
+            with av.open(str(path), metadata_errors="replace") as container:
                 if not container.streams.video:
                     raise InputError.of(path, "the file has no video stream", "export the recording again")
                 stream = container.streams.video[0]
@@ -116,7 +116,7 @@ class VideoFrames:
         index_of_pts = {pts: index for index, pts in enumerate(self.pts)}
         wanted, last = set(indices), max(indices)
         try:
-            with av.open(str(self.path)) as container:
+            with av.open(str(self.path), metadata_errors="replace") as container:
                 stream = container.streams.video[0]
                 stream.thread_type = "AUTO"
                 container.seek(self.pts[min(indices)], stream=stream)

@@ -75,7 +75,7 @@ def _the_video(path: Path) -> Path:
 
 
 def _video_size(path: Path) -> tuple[int, int]:
-    with av.open(str(path)) as container:
+    with av.open(str(path), metadata_errors="replace") as container:
         context = container.streams.video[0].codec_context
         return int(context.width), int(context.height)
 

@@ -328,7 +328,10 @@ def _(home: Path) -> list[Any]:
     return ["evaluate", project.folder, "--truth", home / "truth.tum"]
 
 
-@case("results of an earlier alignment", r"walk: the poses are stale .*; run `gazeloc run` first")
+@case(
+    "results of an earlier alignment",
+    r"walk: the poses of the method sfm are stale .*; run `gazeloc run --method sfm` first",
+)
 def _(home: Path) -> list[Any]:
     artifact = Project.open(home / "aligned").result("walk", Method.SFM, "trajectory")
     header = json.loads((artifact.folder / "header.json").read_text())

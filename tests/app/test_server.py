@@ -160,19 +160,21 @@ def test_a_message_that_is_too_large_closes_only_its_own_connection(server):
     port = server.get_port()
 
     async def talk():
-        async with websockets.asyncio.client.connect(
+        # Not `async with`: closing what the server has closed already is an error inside of asyncio now and then.
+        connection = await websockets.asyncio.client.connect(
             f"ws://localhost:{port}",
             origin=f"http://localhost:{port}",
             subprotocols=[f"viser-v{viser.__version__}"],
             max_size=None,
-        ) as connection:
+        )
+        try:
             await connection.send(b"x" * (MAX_MESSAGE_BYTES + 1))
             while True:
                 await connection.recv()
+        except websockets.exceptions.ConnectionClosed as closed:
+            return closed.rcvd.code
 
-    with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
-        asyncio.run(talk())
-    assert closed.value.rcvd.code == 1009
+    assert asyncio.run(talk()) == 1009
     assert isinstance(connect(server), bytes)
 
 

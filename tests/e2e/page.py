@@ -107,7 +107,7 @@ class ViewerPage:
         self._wait("([n, p]) => !!window.__viserMutable.nodeRefFromName[n] === p", [name, present], timeout_s)
         return self.settle()
 
-    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = 20.0) -> None:
+    def wait_until(self, is_so: Callable[[], bool], timeout_s: float = DRAW_TIMEOUT_S) -> None:
         """Wait until something that is looked up from here is so; the page goes on meanwhile."""
         end = time.monotonic() + timeout_s
         while not is_so():
