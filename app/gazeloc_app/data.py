@@ -18,7 +18,7 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.evaluate import evaluate, match_times
 from gazeloc_core.files import read_json
-from gazeloc_core.localize.sfm import localize_sfm
+from gazeloc_core.localize.sfm import PlacedModel, localize_sfm
 from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
@@ -126,7 +126,7 @@ class ProjectData:
         if alignment is None or model is None or keyframes is None:
             return None
         times = self.recording(recording).timestamp_ns
-        load = lambda: localize_sfm(times, keyframes, model, alignment.scan_from_sfm)  # noqa: E731
+        load = lambda: localize_sfm(times, keyframes, [PlacedModel(model, alignment.scan_from_sfm)])  # noqa: E731
         return self._remember_or_say(f"{recording} trajectory", (key, model, id(keyframes)), load)
 
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:

@@ -14,7 +14,7 @@ from gazeloc_core.correspondences import Correspondences, gather
 from gazeloc_core.errors import GeometryError, ProjectError
 from gazeloc_core.files import read_json, write_json_atomically
 from gazeloc_core.gaze import GazeInScan, GazeOptions, cast_gaze
-from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
+from gazeloc_core.localize.sfm import LocalizeSfmOptions, PlacedModel, localize_sfm
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Chosen, Project
 from gazeloc_core.refine import Refinement, RefineOptions, refine
@@ -203,8 +203,7 @@ def place_trajectory(
     trajectory = localize_sfm(
         opened.timestamp_ns,
         load_keyframes(project, recording),
-        inputs.load_model(project, recording),
-        chosen_alignment(project, recording).scan_from_sfm,
+        [PlacedModel(inputs.load_model(project, recording), chosen_alignment(project, recording).scan_from_sfm)],
         options,
     )
     project.artifact(recording, "trajectory").write_arrays(
