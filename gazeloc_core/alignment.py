@@ -31,6 +31,7 @@ class AlignmentMethod(StrEnum):
     KEYPOINTS = "keypoints"
     ICP_POINT_TO_POINT = "icp-point-to-point"
     ICP_POINT_TO_PLANE = "icp-point-to-plane"
+    SHAPE = "shape"
     GIVEN = "given"
 
 

@@ -75,7 +75,9 @@ class TagCenters:
         ids = sorted(clusters)
         means = [clusters[tag].mean(axis=0) for tag in ids]
         spread = [np.sqrt(np.mean(np.sum((clusters[t] - m) ** 2, axis=1))) for t, m in zip(ids, means, strict=True)]
-        return cls(np.array(ids), np.array(means), np.array([len(clusters[t]) for t in ids]), np.array(spread), (*notes,))
+        return cls(
+            np.array(ids), np.array(means), np.array([len(clusters[t]) for t in ids]), np.array(spread), (*notes,)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bytes, Floats, Ints, frozen
 from gazeloc_core.camera import Camera
+from gazeloc_core.transforms import Similarity
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,3 +57,11 @@ class SfmModel:
     def camera_of(self, image: int) -> Camera:
         """The camera of the image at position `image` (0 to K-1)."""
         return self.cameras[int(self.image_camera_ids[image])]
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedModel:
+    """A reconstruction, or a piece of one, joined to the recording's frames, and where it lies in the scan."""
+
+    model: SfmModel
+    scan_from_sfm: Similarity

@@ -2,7 +2,7 @@
 
 scan       colors ─ tags ─ corners ───────────────────────────┐
 recording  keyframes ─ undistorted ┬ tags ─────────┬ corners ─┴ alignment ─ refinement ─ trajectory ─ gaze
-                                   └ reconstruction ┘
+                                   └ reconstruction ┘          (of each method)
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gazeloc_core.artifacts import Artifact
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report
 from gazeloc_core.project import Project
-from gazeloc_core.stages import gaze, inputs, poses, recording, registration, scan
+from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan
 
 Run = Callable[[Project, str, Report], object]
 Inputs = Callable[[Project, str], Mapping[str, str]]
@@ -142,7 +142,26 @@ _SHARED: tuple[Stage, ...] = (
         run=lambda project, name, report: registration.refine_alignment(project, name, report=report),
         inputs=registration.refinement_inputs,
     ),
+    Stage(
+        name="pieces",
+        title="Align smaller pieces",
+        methods=SFM,
+        run=lambda project, name, report: pieces.align_pieces(project, name, report=report),
+        inputs=pieces.piece_inputs,
+    ),
 )
+
+
+def _alignment(method: Method, title: str, align: Run, depends: Inputs) -> Stage:
+    return Stage(
+        name="alignment",
+        title=title,
+        methods=frozenset({method}),
+        of_method=method,
+        weight=20,
+        run=align,
+        inputs=depends,
+    )
 
 
 def _poses_and_gaze(method: Method, place: Run, depends: Inputs) -> tuple[Stage, ...]:
@@ -167,6 +186,14 @@ def _poses_and_gaze(method: Method, place: Run, depends: Inputs) -> tuple[Stage,
     )
 
 
+def _poses_by_alignment(method: Method) -> tuple[Stage, ...]:
+    return _poses_and_gaze(
+        method,
+        lambda project, name, report: poses.place_by_method(project, name, method, report=report),
+        partial(poses.method_inputs, method=method),
+    )
+
+
 STAGES: tuple[Stage, ...] = (
     *_SHARED,
     *_poses_and_gaze(
@@ -174,6 +201,20 @@ STAGES: tuple[Stage, ...] = (
         lambda project, name, report: poses.place_sfm(project, name, report=report),
         poses.sfm_inputs,
     ),
+    _alignment(
+        Method.SFM_PAPER,
+        "Align as in the paper",
+        lambda project, name, report: baselines.align_sfm_paper(project, name, report=report),
+        baselines.sfm_paper_inputs,
+    ),
+    _alignment(
+        Method.GLOBAL,
+        "Align by shape alone",
+        lambda project, name, report: baselines.align_globally(project, name, report=report),
+        baselines.global_inputs,
+    ),
+    *_poses_by_alignment(Method.SFM_PAPER),
+    *_poses_by_alignment(Method.GLOBAL),
 )
 
 

@@ -10,7 +10,6 @@ the sculpting that the paper cites (its [10]), which removes tetrahedra from out
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError, cKDTree

@@ -3,8 +3,9 @@
     python -m gazeloc_core.synthetic FOLDER --preset studio
 
 writes `scan/` (3D Scanner App "All Data"), `recording/` (Pupil Cloud), `colmap/` (a COLMAP model of the recording),
-`truth/` and `scene.json`. The same options give the same files. What is written is what a phone and glasses would
-write: phone poses drift, the mesh is fused from noisy depth at those poses, the video is dim, noisy and blurred.
+`truth/` and `scene.json`; for a second route in the same scan `recording-second/` and its truth. The same options give
+the same files. What is written is what a phone and glasses would write: phone poses drift, the mesh is fused from noisy
+depth at those poses, the video is dim, noisy and blurred.
 
 Scan coordinates are the frame in which the phone reports its poses; its drift has mean zero.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from gazeloc_core.synthesis.fusion import fused
 from gazeloc_core.synthesis.gaze import looked
 from gazeloc_core.synthesis.glasses import GlassesCapture
 from gazeloc_core.synthesis.room import SCAN_FROM_ROOM, Room, build_room, render
+from gazeloc_core.synthesis.routes import RouteName
 from gazeloc_core.synthesis.tags import FAMILY
 from gazeloc_core.synthesis.texturing import textured, write_obj
 from gazeloc_core.synthetic_model import write_model
@@ -39,7 +41,7 @@ class SceneOptions:
     seed: int = 1
     """Seed of everything random."""
     tag_ids: tuple[int, ...] = (0, 1, 2, 3, 4, 5, 6, 7)
-    """Which of the eight tag places carry a tag."""
+    """Which tags are in the room; each has its place (`room.TAG_PLACES`)."""
     tag_size_m: float = 0.16
     """Distance between the corners that the detector reports, in metres."""
     bare: bool = False
@@ -68,8 +70,12 @@ class SceneOptions:
     """Triangles of the scan's mesh."""
     texel_m: float = 0.0033
     """Size of the texture's texels on the mesh, in metres."""
+    routes: tuple[RouteName, ...] = ("first",)
+    """The routes of the wearer, one recording each."""
+    hurry: float = 1.0
+    """How many times as fast as at ease the wearer walks and turns the head."""
     glasses_seconds: float = 21.0
-    """Length of the recording in seconds (22 at most: then the walk ends)."""
+    """Length of each recording in seconds (22 at most, divided by `hurry`: then the walk ends)."""
     glasses_hz: float = 30.0
     """Mean frame rate of the scene video."""
     glasses_size_px: tuple[int, int] = glasses.SIZE
@@ -84,6 +90,28 @@ class SceneOptions:
     """Every how many frames one goes into the COLMAP model; 0 writes none."""
     exact_room: bool = False
     """Write the exact surfaces of the room to truth/room.ply (0.6 MB)."""
+
+
+_LATER = ("routes", "hurry")
+"""Options that `scene.json` only names where they are not the default: its files of before are still written alike."""
+
+_TABLE2 = SceneOptions(routes=("first", "second"), glasses_seconds=20.0, glasses_hz=12.0, model_stride=0)
+"""Two recordings in one scan; a frame rate that is made in minutes and still gives every keyframe a choice of six."""
+_SETTING_A = replace(_TABLE2, seed=11)
+_SETTING_B = replace(_TABLE2, seed=12, tag_ids=(10, 11, 12, 13, 14, 15, 16, 17), tag_size_m=0.20)
+
+
+def _hard(options: SceneOptions, tag_ids: tuple[int, ...]) -> SceneOptions:
+    """The same setting in a bare, dim room with few tags, for a wearer who is in a hurry."""
+    return replace(
+        options,
+        tag_ids=tag_ids,
+        bare=True,
+        hurry=1.5,
+        glasses_seconds=14.0,
+        glasses_exposure_s=0.010,
+        glasses_gain=0.16,
+    )
 
 
 PRESETS = {
@@ -104,7 +132,12 @@ PRESETS = {
         model_stride=0,
         exact_room=True,
     ),
+    "table2-a-plain": _SETTING_A,
+    "table2-a-hard": _hard(_SETTING_A, (0, 1, 2, 3, 4)),
+    "table2-b-plain": _SETTING_B,
+    "table2-b-hard": _hard(_SETTING_B, (10, 11, 12, 13, 15)),
 }
+"""`studio` is the sample scene; the scenes of Table II have two settings of markers, each plain and hard."""
 
 
 def scene_room(options: SceneOptions, report: Report = silent) -> Room:
@@ -124,18 +157,15 @@ def scene_room(options: SceneOptions, report: Report = silent) -> Room:
 def write_scene(folder: Path, options: SceneOptions = SceneOptions(), report: Report = silent) -> None:
     """Write a whole scene into `folder`, which is made if it is missing; files of the same names are replaced."""
     room = scene_room(options, part(report, 0.0, 0.04))
-    for name in ("scan", "recording", "truth"):
+    for name in ("scan", "truth", *(recording_name(route) for route in options.routes)):
         (folder / name).mkdir(parents=True, exist_ok=True)
     capture = _write_scan(folder / "scan", room, options, part(report, 0.04, 0.2))
-    recording = _write_recording(folder, room, options, part(report, 0.2, 0.85))
-    truth.write_poses(
-        folder / "truth",
-        recording.timestamp_ns,
-        recording.poses_at(recording.timestamp_ns),
-        capture.seconds.tolist(),
-        capture.true,
-    )
+    truth.write_phone(folder / "truth" / "phone.tum", capture.seconds.tolist(), capture.true)
     truth.write_tags(folder / "truth", room.tags, options.tag_size_m)
+    step = 0.65 / len(options.routes)
+    for number, route in enumerate(options.routes):
+        share = part(report, 0.2 + number * step, 0.2 + (number + 1) * step)
+        _write_recording(folder, room, route, options, share)
     if options.exact_room:
         truth.write_room(folder / "truth" / "room.ply", room.mesh)
     if options.model_stride:
@@ -144,6 +174,33 @@ def write_scene(folder: Path, options: SceneOptions = SceneOptions(), report: Re
         )
     _write_description(folder, options)
     report(1.0, "done")
+
+
+def recording_name(route: RouteName) -> str:
+    """The folder of a route's recording within the scene."""
+    return "recording" + _suffix(route)
+
+
+def truth_name(route: RouteName) -> str:
+    """The file of a route's true poses within the scene."""
+    return f"truth/glasses{_suffix(route)}.tum"
+
+
+def _suffix(route: RouteName) -> str:
+    return "" if route == "first" else f"-{route}"
+
+
+def glasses_capture(route: RouteName, options: SceneOptions) -> GlassesCapture:
+    """A route's recording before anything is drawn: its lens, times and exact path."""
+    seed = _seed(route, options)
+    times = glasses.frame_times(options.glasses_seconds, options.glasses_hz, seed + 30)
+    path = paths.head_path(seed + 40, route, options.hurry)
+    lens = glasses.lens(options.glasses_size_px)
+    return GlassesCapture(lens, times, path, SCAN_FROM_ROOM, options.glasses_exposure_s)
+
+
+def _seed(route: RouteName, options: SceneOptions) -> int:
+    return options.seed + (0 if route == "first" else 1000)
 
 
 def _write_scan(folder: Path, room: Room, options: SceneOptions, report: Report) -> phone.PhoneCapture:
@@ -159,21 +216,20 @@ def _write_scan(folder: Path, room: Room, options: SceneOptions, report: Report)
     return capture
 
 
-def _write_recording(folder: Path, room: Room, options: SceneOptions, report: Report) -> GlassesCapture:
-    times = glasses.frame_times(options.glasses_seconds, options.glasses_hz, options.seed + 30)
-    path = paths.head_path(options.seed + 40)
-    lens = glasses.lens(options.glasses_size_px)
-    capture = GlassesCapture(lens, times, path, SCAN_FROM_ROOM, options.glasses_exposure_s)
-    gaze = looked(room, capture, options.seed + 50)
-    glasses.write_camera(folder / "recording", capture)
-    cloud.write_tables(folder / "recording", capture, gaze, options.seed)
-    truth.write_gaze(folder / "truth", gaze)
-    video = folder / "recording" / cloud.video_name(capture, options.seed)
-    glasses.write_video(video, room, capture, options.glasses_gain, options.video_crf, options.seed, report)
-    return capture
+def _write_recording(scene: Path, room: Room, route: RouteName, options: SceneOptions, report: Report) -> None:
+    capture, seed = glasses_capture(route, options), _seed(route, options)
+    folder = scene / recording_name(route)
+    gaze = looked(room, capture, seed + 50)
+    glasses.write_camera(folder, capture)
+    cloud.write_tables(folder, capture, gaze, seed)
+    truth.write_gaze(scene / "truth" / f"gaze3d{_suffix(route)}.csv", gaze)
+    truth.write_glasses(scene / truth_name(route), capture.timestamp_ns, capture.poses_at(capture.timestamp_ns))
+    video = folder / cloud.video_name(capture, seed)
+    glasses.write_video(video, room, capture, options.glasses_gain, options.video_crf, seed, report)
 
 
 def _write_description(folder: Path, options: SceneOptions) -> None:
+    plain = asdict(SceneOptions())
     description = {
         "scan": "scan",
         "recording": "recording",
@@ -181,8 +237,10 @@ def _write_description(folder: Path, options: SceneOptions) -> None:
         "truth": "truth/glasses.tum",
         "tag_family": FAMILY,
         "tag_size_m": options.tag_size_m,
-        "options": asdict(options),
+        "options": {k: v for k, v in asdict(options).items() if k not in _LATER or v != plain[k]},
     }
+    if len(options.routes) > 1:
+        description["recordings"] = {route: [recording_name(route), truth_name(route)] for route in options.routes}
     text = json.dumps(description, indent=2) + "\n"
     (folder / "scene.json").write_text(text)
     (folder / "truth" / "scene.json").write_text(text)
@@ -194,7 +252,7 @@ def _print_report(fraction: float, text: str = "", /) -> None:
 
 
 def main(folder: Path, /, preset: str = "studio") -> None:
-    """Write the scene of a preset (studio or tiny) into FOLDER."""
+    """Write the scene of a preset (studio, tiny, table2-a-plain, ...) into FOLDER."""
     if preset not in PRESETS:
         sys.exit(f"There is no preset {preset!r}; use one of {', '.join(PRESETS)}.")
     write_scene(folder, PRESETS[preset], _print_report)

@@ -25,8 +25,9 @@ from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan
-from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.sfm_model import PlacedModel, SfmModel
 from gazeloc_core.stages import inputs, registration
+from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.trajectory import Trajectory
@@ -149,8 +150,15 @@ class ProjectData:
         if alignment is None or model is None or keyframes is None:
             return None
         times = self.recording(recording).timestamp_ns
-        load = lambda: localize_sfm(times, keyframes, model, alignment.scan_from_sfm)  # noqa: E731
-        return self._remember_or_say(f"{recording} trajectory", (key, model, id(keyframes)), load)
+        placed = [PlacedModel(model, alignment.scan_from_sfm), *self.pieces(recording)]
+        load = lambda: localize_sfm(times, keyframes, placed)  # noqa: E731
+        content = (key, model, id(keyframes), _stamp(self.project.artifact(recording, "pieces")))
+        return self._remember_or_say(f"{recording} trajectory", content, load)
+
+    def pieces(self, recording: str) -> list[PlacedModel]:
+        """The smaller pieces of the reconstruction that have a place in the scan."""
+        artifact = self.project.artifact(recording, "pieces")
+        return self._read(f"{recording} pieces", artifact, lambda: placed_pieces(self.project, recording)) or []
 
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
         """The ground truth: times and `scan_from_camera`."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_core.arrays import Ints
 from gazeloc_core.colmap_io import write_model
 from gazeloc_core.errors import InputError
 from gazeloc_core.export.files import move_all, staging_folder
-from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.transforms import Similarity
+from gazeloc_core.sfm_model import PlacedModel, SfmModel
 
 MARKER = "gazeloc.txt"
 MARKER_TEXT = (
@@ -16,8 +20,10 @@ MARKER_TEXT = (
 )
 
 
-def write_colmap(model: SfmModel, scan_from_sfm: Similarity, folder: Path, *, overwrite: bool = False) -> list[Path]:
-    """Write cameras, images and points of `model`, mapped into the scan, to `folder`; the list of files written.
+def write_colmap(placed: Sequence[PlacedModel], folder: Path, *, overwrite: bool = False) -> list[Path]:
+    """Write cameras, images and points of a reconstruction's pieces, mapped into the scan, to `folder`; the files.
+
+    An image that is in two pieces is written with its pose in the first.
 
     Raises:
         InputError: if the folder holds files that GazeLoc did not write, or cannot be written.
@@ -27,15 +33,28 @@ def write_colmap(model: SfmModel, scan_from_sfm: Similarity, folder: Path, *, ov
     is_foreign = folder.is_dir() and any(folder.iterdir()) and not (folder / MARKER).is_file()
     if is_foreign and not overwrite:
         raise InputError.of(folder, "the folder holds files that GazeLoc did not write", "choose another output folder")
+    rows = [_new_images(piece.model, placed[:number]) for number, piece in enumerate(placed)]
+    models = [piece.model for piece in placed]
+    poses = [
+        piece.scan_from_sfm.compose_pose(piece.model.sfm_from_camera[row])
+        for piece, row in zip(placed, rows, strict=True)
+        if len(row)
+    ]
     with staging_folder(folder) as staging:
         write_model(
             staging,
-            model.cameras,
-            model.image_names,
-            model.image_camera_ids,
-            scan_from_sfm.compose_pose(model.sfm_from_camera),
-            scan_from_sfm.apply(model.points),
-            model.point_colors,
+            {key: camera for model in reversed(models) for key, camera in model.cameras.items()},
+            tuple(model.image_names[i] for model, row in zip(models, rows, strict=True) for i in row),
+            np.concatenate([model.image_camera_ids[row] for model, row in zip(models, rows, strict=True)]),
+            RigidTransform.concatenate(poses),
+            np.concatenate([piece.scan_from_sfm.apply(piece.model.points) for piece in placed]),
+            np.concatenate([model.point_colors for model in models]),
         )
         (staging / MARKER).write_text(MARKER_TEXT, encoding="utf-8")
         return move_all(staging, folder)
+
+
+def _new_images(model: SfmModel, before: Sequence[PlacedModel]) -> Ints:
+    """The rows of the model's images that are in none of the pieces before it."""
+    known = {name for piece in before for name in piece.model.image_names}
+    return np.array([i for i, name in enumerate(model.image_names) if name not in known], dtype=np.int64)

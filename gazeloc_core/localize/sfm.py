@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bools, Ints
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.trajectory import PoseStatus, Trajectory
-from gazeloc_core.transforms import Similarity, interpolate_poses
+from gazeloc_core.transforms import interpolate_poses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,39 +26,62 @@ class LocalizeSfmOptions:
 def localize_sfm(
     timestamp_ns: Ints,
     keyframes: Ints,
-    model: SfmModel,
-    scan_from_sfm: Similarity,
+    placed: Sequence[PlacedModel],
     options: LocalizeSfmOptions | None = None,
 ) -> Trajectory:
     """The trajectory of a recording with times (N,) and keyframes at these frame indices.
 
-    - `registered`: the model has an image of this frame (a keyframe or not).
-    - `interpolated`: it has none, but the nearest registered frames before and after are at most `max_gap_s` apart.
+    `placed` are the pieces of the reconstruction that have a place, largest first; a frame that is in two of them takes
+    its pose from the first.
+
+    - `registered`: a piece has an image of this frame (a keyframe or not).
+    - `interpolated`: none has, but the nearest registered frames before and after are of one piece and at most
+      `max_gap_s` apart.
     - `none`: all others. A keyframe that the reconstruction was given and could not register is among them: it was
       tried and failed, which speaks against the motion around it being simple, so it is never filled in.
 
     Raises:
-        GeometryError: if the model's images are not of this recording, or two of them are of the same frame.
+        GeometryError: if a piece's images are not of this recording, or two of one piece are of the same frame.
     """
     options = options or LocalizeSfmOptions()
     times = np.asarray(timestamp_ns, dtype=np.int64)
     is_keyframe = _mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
-    images = np.flatnonzero(model.frame_indices >= 0)
-    images = images[np.argsort(model.frame_indices[images], kind="stable")]
-    frames = model.frame_indices[images]
-    is_registered = _mask(frames, len(times), "images of the reconstruction")
     status = np.full(len(times), PoseStatus.NONE.value, dtype="U16")
-    if len(frames) == 0:
+    frames, owner, poses = _registered(placed, len(times))
+    if poses is None:
         return Trajectory.from_poses(times, status, is_keyframe, frames, None)
-    poses = scan_from_sfm.compose_pose(model.sfm_from_camera[images])
     status[frames] = PoseStatus.REGISTERED.value
-    between = np.flatnonzero(~is_registered & ~is_keyframe & within_gaps(times, times[frames], options.max_gap_s))
+    is_open = (status == PoseStatus.NONE.value) & ~is_keyframe & within_gaps(times, times[frames], options.max_gap_s)
+    between = np.flatnonzero(is_open)
+    after = np.searchsorted(frames, between)
+    between = between[owner[after] == owner[after - 1]]
     status[between] = PoseStatus.INTERPOLATED.value
     wanted = np.sort(np.concatenate([frames, between]))
     seconds = (times - times[0]) / 1e9
     return Trajectory.from_poses(
         times, status, is_keyframe, wanted, interpolate_poses(seconds[frames], poses, seconds[wanted])
     )
+
+
+def _registered(placed: Sequence[PlacedModel], count: int) -> tuple[Ints, Ints, RigidTransform | None]:
+    """The registered frames, rising, the piece that each is taken from, and their poses (None for no frame)."""
+    owner = np.full(count, -1, dtype=np.int64)
+    frames: list[Ints] = []
+    poses: list[RigidTransform] = []
+    for number, piece in enumerate(placed):
+        images = np.flatnonzero(piece.model.frame_indices >= 0)
+        _mask(piece.model.frame_indices[images], count, "images of the reconstruction")
+        images = images[owner[piece.model.frame_indices[images]] < 0]
+        if len(images) == 0:
+            continue
+        frames.append(piece.model.frame_indices[images])
+        owner[frames[-1]] = number
+        poses.append(piece.scan_from_sfm.compose_pose(piece.model.sfm_from_camera[images]))
+    if not frames:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), None
+    joined = np.concatenate(frames)
+    order = np.argsort(joined)
+    return joined[order], owner[joined[order]], RigidTransform.concatenate(poses)[order]
 
 
 def within_gaps(at_ns: Ints, known_ns: Ints, max_gap_s: float) -> Bools:

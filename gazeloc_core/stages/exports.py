@@ -20,7 +20,7 @@ from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.gaze import gaze_inputs
-from gazeloc_core.stages.poses import fresh_trajectory, scan_from_model
+from gazeloc_core.stages.poses import fresh_trajectory, placed_models
 from gazeloc_core.undistort import Undistorter
 
 
@@ -83,8 +83,7 @@ def _colmap(project: Project, recording: str, method: Method, folder: Path, repo
             "nerfstudio, or a method that does."
         )
     fresh_trajectory(project, recording, method)
-    scan_from_sfm = scan_from_model(project, recording, method)
-    return write_colmap(inputs.load_model(project, recording), scan_from_sfm, folder)
+    return write_colmap(placed_models(project, recording, method), folder)
 
 
 def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:

@@ -142,6 +142,12 @@ def load_model(project: Project, recording: str, rank: int = 0) -> SfmModel:
     return _model(artifact, rank, artifact.header().content)
 
 
+def load_models(project: Project, recording: str) -> list[SfmModel]:
+    """All models of the reconstruction, the largest first."""
+    count = int(project.artifact(recording, "reconstruction").header().stats["models"])
+    return [load_model(project, recording, rank) for rank in range(count)]
+
+
 def model_arrays(models: list[SfmModel]) -> dict[str, Any]:
     """The columns of all models, for an artifact; model 0 is the largest."""
     arrays: dict[str, Any] = {}

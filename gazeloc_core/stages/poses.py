@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 
 from gazeloc_core.artifacts import State
@@ -10,57 +11,97 @@ from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
+from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.baselines import method_alignment
+from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.registration import chosen_alignment
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.transforms import Similarity
 
 
 def place_sfm(
     project: Project, recording: str, options: LocalizeSfmOptions | None = None, report: Report = silent
 ) -> Trajectory:
-    """Put the reconstruction's camera poses into the scan by the alignment in force."""
-    options = options or LocalizeSfmOptions()
-    report(0.1, "placing the cameras")
-    trajectory = localize_sfm(
-        inputs.load_recording(project, recording).timestamp_ns,
-        load_keyframes(project, recording),
-        inputs.load_model(project, recording),
-        chosen_alignment(project, recording).scan_from_sfm,
-        options,
-    )
-    project.result(recording, Method.SFM, "trajectory").write_arrays(
-        inputs.trajectory_arrays(trajectory),
-        options=asdict(options),
-        inputs=sfm_inputs(project, recording),
-        stats=_counts(trajectory),
-    )
-    return trajectory
+    """Put the reconstruction's camera poses into the scan by the alignment in force, smaller pieces by theirs."""
+    pieces = project.artifact(recording, "pieces").header().notes
+    return _place_models(project, recording, Method.SFM, sfm_inputs(project, recording), options, pieces, report)
 
 
 def sfm_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the poses of the method `sfm` depend on."""
     chosen = project.settings.chosen.get(recording)
     return {
-        "keyframes": project.artifact(recording, "keyframes").header().content,
-        "reconstruction": project.artifact(recording, "reconstruction").header().content,
+        **_model_inputs(project, recording),
+        "pieces": project.artifact(recording, "pieces").header().content,
         "alignment": chosen_alignment(project, recording).key if chosen is None else chosen.alignment,
     }
 
 
-def scan_from_model(project: Project, recording: str, method: Method) -> Similarity:
-    """Where a method puts the reconstruction.
+def place_by_method(
+    project: Project,
+    recording: str,
+    method: Method,
+    options: LocalizeSfmOptions | None = None,
+    report: Report = silent,
+) -> Trajectory:
+    """Put the reconstruction's camera poses into the scan by the alignment of `sfm-paper` or `global`."""
+    notes = project.result(recording, method, "alignment").header().notes
+    return _place_models(project, recording, method, method_inputs(project, recording, method), options, notes, report)
+
+
+def method_inputs(project: Project, recording: str, method: Method) -> dict[str, str]:
+    """The hashes that the poses of `sfm-paper` and `global` depend on."""
+    alignment = project.result(recording, method, "alignment").header().content
+    return {**_model_inputs(project, recording), "alignment": alignment}
+
+
+def _model_inputs(project: Project, recording: str) -> dict[str, str]:
+    return {stage: project.artifact(recording, stage).header().content for stage in ("keyframes", "reconstruction")}
+
+
+def placed_models(project: Project, recording: str, method: Method) -> list[PlacedModel]:
+    """The reconstruction, or its pieces, where a method puts them in the scan.
 
     Raises:
-        ProjectError: if it has not aligned it yet.
+        ProjectError: if the method has not aligned it yet.
     """
-    del method
-    return chosen_alignment(project, recording).scan_from_sfm
+    largest = inputs.load_model(project, recording)
+    if method is not Method.SFM:
+        return [PlacedModel(largest, method_alignment(project, recording, method).scan_from_sfm)]
+    in_force = chosen_alignment(project, recording)
+    return [PlacedModel(largest, in_force.scan_from_sfm), *placed_pieces(project, recording)]
 
 
-INPUTS = {Method.SFM: sfm_inputs}
-"""The hashes that each method's poses depend on."""
+def _place_models(
+    project: Project,
+    recording: str,
+    method: Method,
+    depends: Mapping[str, str],
+    options: LocalizeSfmOptions | None,
+    notes: tuple[str, ...],
+    report: Report,
+) -> Trajectory:
+    options = options or LocalizeSfmOptions()
+    report(0.1, "placing the cameras")
+    trajectory = localize_sfm(
+        inputs.load_recording(project, recording).timestamp_ns,
+        load_keyframes(project, recording),
+        placed_models(project, recording, method),
+        options,
+    )
+    project.result(recording, method, "trajectory").write_arrays(
+        inputs.trajectory_arrays(trajectory),
+        options=asdict(options),
+        inputs=depends,
+        notes=notes,
+        stats=_counts(trajectory),
+    )
+    return trajectory
+
+
+def _inputs_of(project: Project, recording: str, method: Method) -> dict[str, str]:
+    return sfm_inputs(project, recording) if method is Method.SFM else method_inputs(project, recording, method)
 
 
 def fresh_trajectory(project: Project, recording: str, method: Method = Method.SFM) -> Trajectory:
@@ -70,7 +111,7 @@ def fresh_trajectory(project: Project, recording: str, method: Method = Method.S
         ProjectError: if there are none, or they are of an earlier alignment or reconstruction.
     """
     artifact = project.result(recording, method, "trajectory")
-    state, reason = artifact.state(INPUTS[method](project, recording))
+    state, reason = artifact.state(_inputs_of(project, recording, method))
     if state is not State.FRESH:
         raise ProjectError(
             f"{recording}: the poses of the method {method} are {state.value} ({reason}); "
@@ -91,7 +132,7 @@ def fresh_methods(project: Project, recording: str) -> list[Method]:
 
 def _is_fresh(project: Project, recording: str, method: Method) -> bool:
     try:
-        expected = INPUTS[method](project, recording)
+        expected = _inputs_of(project, recording, method)
     except GazelocError:  # an earlier stage has no result any more
         return False
     return project.result(recording, method, "trajectory").state(expected)[0] is State.FRESH

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_core.arrays import Bytes, Ints
+from gazeloc_core.arrays import Bytes, Floats, Ints
 from gazeloc_core.camera import Camera
 from gazeloc_core.progress import Report
 from gazeloc_core.synthesis.paths import Path
@@ -135,18 +135,32 @@ def _motion(
     depth: NDArray[np.float32] | None,
 ) -> NDArray[np.float32]:
     """How far each point of a coarse grid of pixels moves during the exposure, (rows, columns, 2) px."""
+    pixels = motion_grid(camera)
+    far = np.full(len(pixels), 2.0)
+    if depth is not None:
+        x, y = pixels.astype(int).T
+        far = np.where(np.isfinite(depth[y, x]), depth[y, x], 10.0)
+    poses = RigidTransform.concatenate([scan_from_begin, scan_from_middle, scan_from_end])
+    rows = len(range(MOTION_GRID_PX // 2, camera.height, MOTION_GRID_PX))
+    return np.asarray(moved_px(camera, pixels, far, poses).reshape(rows, -1, 2), dtype=np.float32)
+
+
+def motion_grid(camera: Camera) -> Floats:
+    """The pixels (G, 2) at which motion is measured, row by row."""
     xs = np.arange(MOTION_GRID_PX / 2, camera.width, MOTION_GRID_PX)
     ys = np.arange(MOTION_GRID_PX / 2, camera.height, MOTION_GRID_PX)
-    x, y = np.meshgrid(xs, ys)
-    rays = camera.unproject(np.column_stack([x.ravel(), y.ravel()]))
-    far = np.full(len(rays), 2.0)
-    if depth is not None:
-        values = depth[y.astype(int), x.astype(int)].ravel()
-        far = np.where(np.isfinite(values), values, 10.0)
-    points = scan_from_middle.apply(rays / rays[:, 2:] * far[:, None])
-    begin = camera.project(scan_from_begin.inv().apply(points))
-    end = camera.project(scan_from_end.inv().apply(points))
-    return np.asarray(np.nan_to_num(end - begin).reshape(len(ys), len(xs), 2), dtype=np.float32)
+    return np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+
+
+def moved_px(camera: Camera, pixels: Floats, depth: Floats, poses: RigidTransform) -> Floats:
+    """How far (G, 2) what lies at `depth` (G,) behind pixels (G, 2) moves from the first of three poses to the last.
+
+    The pixels are those of the second pose; all three are `scan_from_camera`.
+    """
+    rays = camera.unproject(pixels)
+    points = poses[1].apply(rays / rays[:, 2:] * depth[:, None])
+    begin, end = (camera.project(pose.inv().apply(points)) for pose in (poses[0], poses[2]))
+    return np.asarray(np.nan_to_num(end - begin))
 
 
 def _smeared(radiance: NDArray[np.float32], motion: NDArray[np.float32]) -> NDArray[np.float32]:

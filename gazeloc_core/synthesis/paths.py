@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.arrays import Floats
+from gazeloc_core.synthesis.routes import ROUTES, RouteName
 
 Aim: TypeAlias = Callable[[Floats, Floats], Floats]
 """The points (T, 3) that are looked at, at times (T,) from places (T, 3)."""
@@ -32,10 +34,12 @@ class Path:
     step_hz: float
     """Steps per second of a walker; 0 for a hand."""
     seed: int
+    hurry: float = 1.0
+    """How many times as fast the path is taken as its own times say."""
 
     def poses(self, seconds: ArrayLike) -> RigidTransform:
         """`room_from_camera` at times (T,)."""
-        t = np.asarray(seconds, dtype=np.float64)
+        t = np.asarray(seconds, dtype=np.float64) * self.hurry
         eye = CubicSpline(self.eye_s, self.eyes, bc_type="natural")(t)
         speed = np.linalg.norm(CubicSpline(self.eye_s, self.eyes, bc_type="natural")(t, 1)[:, [0, 2]], axis=1)
         stride = np.clip(speed / 0.6, 0, 1) * (self.step_hz > 0)
@@ -117,57 +121,15 @@ def phone_path(seconds: float, seed: int) -> Path:
     return Path(t, eye, lambda seconds, _: np.asarray(follow(seconds)), 0.012, 0.9, 0.0, seed)
 
 
-EYES = np.array(
-    [  # seconds, x, y, z
-        (0.0, 0.62, 1.64, 1.02),
-        (1.8, 0.38, 1.64, 0.72),
-        (3.8, 0.02, 1.63, -0.35),
-        (5.4, 0.12, 1.62, -0.98),
-        (6.8, 0.48, 1.44, -1.12),
-        (8.0, 0.55, 1.60, -0.95),
-        (9.6, 1.02, 1.64, -0.35),
-        (11.2, 1.52, 1.64, 0.10),
-        (12.6, 1.42, 1.63, 0.32),
-        (14.4, 0.55, 1.64, 0.70),
-        (16.2, -0.45, 1.64, 1.02),
-        (18.0, -1.30, 1.62, 0.85),
-        (19.3, -1.75, 1.36, 0.55),
-        (20.4, -1.92, 1.18, 0.40),
-        (22.5, -1.95, 1.17, 0.36),
-    ]
-)
-LOOKS = np.array(
-    [  # seconds from, seconds to, x, y, z
-        (0.0, 0.5, -2.4, 1.0, -0.1),
-        (1.5, 2.0, -2.7, 1.3, -0.3),
-        (3.0, 3.4, -1.0, 0.6, -0.3),
-        (4.2, 4.6, -1.1, 1.3, -2.1),
-        (5.7, 6.0, 0.5, 1.2, -2.1),
-        (6.8, 7.3, 1.0, 0.85, -1.7),
-        (8.2, 8.6, 1.7, 1.2, -2.0),
-        (9.5, 9.9, 2.75, 1.3, -1.2),
-        (10.8, 11.3, 2.6, 1.2, 0.1),
-        (12.2, 12.5, 2.3, 1.1, 1.8),
-        (13.5, 13.8, 0.9, 1.4, 2.1),
-        (14.8, 15.3, -0.9, 1.3, 2.1),
-        (16.2, 16.6, -1.4, 0.8, 1.8),
-        (17.5, 17.8, -2.75, 1.25, 1.1),
-        (18.6, 18.9, -2.7, 1.1, -0.9),
-        (19.7, 20.0, -1.0, 0.9, -1.6),
-        (20.8, 22.5, 0.6, 0.95, -0.9),
-    ]
-)
-
-
-def glances(t: Floats, eye: Floats) -> Floats:
-    """What a person looks at who rests on each of `LOOKS` and turns the short way round to the next.
+def glances(looks: Floats, t: Floats, eye: Floats) -> Floats:
+    """What a person looks at who rests on each of `looks` (see `Route`) and turns the short way round to the next.
 
     Directions are blended, not points: a point half-way between two things may lie behind the eye.
     """
-    i = np.clip(np.searchsorted(LOOKS[:, 0], t, side="right") - 1, 0, len(LOOKS) - 2)
-    s = np.clip((t - LOOKS[i, 1]) / (LOOKS[i + 1, 0] - LOOKS[i, 1]), 0, 1)
+    i = np.clip(np.searchsorted(looks[:, 0], t, side="right") - 1, 0, len(looks) - 2)
+    s = np.clip((t - looks[i, 1]) / (looks[i + 1, 0] - looks[i, 1]), 0, 1)
     s = s * s * (3 - 2 * s)
-    (yaw, pitch), (next_yaw, next_pitch) = _angles(LOOKS[i, 2:] - eye), _angles(LOOKS[i + 1, 2:] - eye)
+    (yaw, pitch), (next_yaw, next_pitch) = _angles(looks[i, 2:] - eye), _angles(looks[i + 1, 2:] - eye)
     yaw = yaw + s * (np.mod(next_yaw - yaw + np.pi, 2 * np.pi) - np.pi)
     pitch = pitch + s * (next_pitch - pitch)
     way = np.column_stack([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
@@ -178,6 +140,7 @@ def _angles(way: Floats) -> tuple[Floats, Floats]:
     return np.arctan2(way[:, 0], way[:, 2]), np.arctan2(way[:, 1], np.hypot(way[:, 0], way[:, 2]))
 
 
-def head_path(seed: int) -> Path:
-    """A person who comes in, bends over the desk, passes the shelf and the sideboard, and sits down on the sofa."""
-    return Path(EYES[:, 0], EYES[:, 1:], glances, 0.008, 1.1, 1.9, seed)
+def head_path(seed: int, route: RouteName = "first", hurry: float = 1.0) -> Path:
+    """The head of a person who takes a route; one in a hurry does everything `hurry` times as fast."""
+    eyes, looks = ROUTES[route].eyes, ROUTES[route].looks
+    return Path(eyes[:, 0], eyes[:, 1:], partial(glances, looks), 0.008, 1.1, 1.9, seed, hurry)

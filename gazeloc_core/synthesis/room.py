@@ -121,7 +121,16 @@ TAG_PLACES: tuple[tuple[int, tuple[float, float, float], Rotation], ...] = (
     (5, (-1.1, 0.46, 1.641), _facing(180)),
     (6, (0.86, 0.74, -1.62), _facing(0, -90)),
     (7, (1.26, 0.23, 0.85), _facing(-112)),
+    (10, (-1.04, 1.02, -Z), _facing(0)),
+    (11, (X, 0.92, 1.42), _facing(-90)),
+    (12, (0.12, 1.24, Z), _facing(180)),
+    (13, (-X, 1.04, 0.34), _facing(90)),
+    (14, (-0.86, 0.8, 1.85), _facing(180, -90)),
+    (15, (-0.62, 0.46, 1.641), _facing(180)),
+    (16, (1.75, 0.0, -0.5), _facing(-90, -90)),
+    (17, (1.43, 0.44, 0.92), _facing(-112, -90)),
 )
+"""Tag, centre and facing: ids below 10 are one setting of markers, the others a second one in other places."""
 
 
 def _lights() -> list[AreaLight | Lamp]:

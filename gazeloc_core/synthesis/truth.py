@@ -36,14 +36,14 @@ def tum_text(times: Sequence[str], poses: RigidTransform) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_poses(
-    folder: Path, glasses_ns: Ints, glasses: RigidTransform, phone_s: Sequence[float], phone: RigidTransform
-) -> None:
-    """`glasses.tum` by the recording's clock and `phone.tum` by the frames' `time`."""
-    times = [seconds_text(t) for t in glasses_ns.tolist()]
-    (folder / "glasses.tum").write_text(tum_text(times, glasses))
-    stamps = [f"{Decimal(repr(float(t))):.9f}" for t in phone_s]
-    (folder / "phone.tum").write_text(tum_text(stamps, phone))
+def write_glasses(file: Path, timestamp_ns: Ints, poses: RigidTransform) -> None:
+    """`glasses.tum`, by the recording's clock."""
+    file.write_text(tum_text([seconds_text(t) for t in timestamp_ns.tolist()], poses))
+
+
+def write_phone(file: Path, seconds: Sequence[float], poses: RigidTransform) -> None:
+    """`phone.tum`, by the frames' `time`."""
+    file.write_text(tum_text([f"{Decimal(repr(float(t))):.9f}" for t in seconds], poses))
 
 
 def write_tags(folder: Path, tags: Sequence[PlacedTag], size_m: float) -> None:
@@ -57,13 +57,13 @@ def write_tags(folder: Path, tags: Sequence[PlacedTag], size_m: float) -> None:
     (folder / "tags.json").write_text(json.dumps(value, indent=1))
 
 
-def write_gaze(folder: Path, gaze: GazeTruth) -> None:
+def write_gaze(file: Path, gaze: GazeTruth) -> None:
     """`gaze3d.csv`: where the person truly looked, without the tracker's error."""
     lines = ["timestamp [ns],hit x [m],hit y [m],hit z [m],kind"]
     kinds = np.where(gaze.blink_id > 0, "blink", np.where(gaze.fixation_id > 0, "fixation", "saccade"))
     for t, hit, kind in zip(gaze.timestamp_ns.tolist(), gaze.hit.tolist(), kinds.tolist(), strict=True):
         lines.append(f"{t},{hit[0]:.4f},{hit[1]:.4f},{hit[2]:.4f},{kind}")
-    (folder / "gaze3d.csv").write_text("\n".join(lines) + "\n")
+    file.write_text("\n".join(lines) + "\n")
 
 
 def write_room(file: Path, mesh: Mesh) -> None:

@@ -20,6 +20,7 @@ from gazeloc_core.export.nerfstudio import registered_frames, write_nerfstudio
 from gazeloc_core.export.poses_csv import write_poses_csv
 from gazeloc_core.export.tum import TumOptions, write_tum
 from gazeloc_core.gaze import GazeInScan
+from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
 
@@ -80,7 +81,7 @@ def test_tum_times_are_exact_to_the_nanosecond(tmp_path):
 
 def test_pycolmap_reads_the_model_in_scan_coordinates(tmp_path):
     room = make_room(points=300, images=6)
-    files = write_colmap(room.model, room.scan_from_sfm, tmp_path / "model")
+    files = write_colmap([PlacedModel(room.model, room.scan_from_sfm)], tmp_path / "model")
     assert all(path.is_file() for path in files)
     model = pycolmap.Reconstruction(tmp_path / "model")
     assert sorted(image.name for image in model.images.values()) == sorted(room.model.image_names)
@@ -161,7 +162,7 @@ def write_any(kind: str, folder, **options):
     if kind == "tum":
         return write_tum(trajectory, folder / "poses.tum", **options)
     if kind == "colmap":
-        return write_colmap(room.model, room.scan_from_sfm, folder, **options)
+        return write_colmap([PlacedModel(room.model, room.scan_from_sfm)], folder, **options)
     paths = {i: f"images/{i}.png" for i in range(6)}
     return write_nerfstudio(trajectory, PINHOLE, folder, file_paths=paths, **options)
 

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from box_room import make_room
+from scipy.spatial.transform import Rotation
 
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm, within_gaps
-from gazeloc_core.transforms import rotation_angle_rad
+from gazeloc_core.sfm_model import PlacedModel
+from gazeloc_core.transforms import Similarity, rotation_angle_rad
 
 START_NS = 1_700_000_000_123_456_789
 
@@ -24,7 +26,7 @@ def times(count: int, step_s: float = 0.1):
 def test_every_frame_has_a_row_and_its_true_status():
     room, model = model_of([2, 5, 20, -1])
     # 0, 1 before the first; 3, 4 between neighbours 0.3 s apart; 8 in a gap of 1.5 s; 4 a keyframe that failed.
-    trajectory = localize_sfm(times(24), np.array([2, 4, 5, 20]), model, room.scan_from_sfm)
+    trajectory = localize_sfm(times(24), np.array([2, 4, 5, 20]), [PlacedModel(model, room.scan_from_sfm)])
     expected = ["none"] * 24
     for index, status in {2: "registered", 3: "interpolated", 4: "none", 5: "registered", 20: "registered"}.items():
         expected[index] = status
@@ -34,7 +36,7 @@ def test_every_frame_has_a_row_and_its_true_status():
 
 def test_registered_poses_are_those_of_the_images_whatever_their_order():
     room, model = model_of([7, 0, 3])
-    trajectory = localize_sfm(times(8), np.array([0, 3, 7]), model, room.scan_from_sfm)
+    trajectory = localize_sfm(times(8), np.array([0, 3, 7]), [PlacedModel(model, room.scan_from_sfm)])
     for image, frame in enumerate([7, 0, 3]):
         pose, truth = trajectory.pose(frame), room.scan_from_camera[image]
         assert pose is not None
@@ -44,7 +46,7 @@ def test_registered_poses_are_those_of_the_images_whatever_their_order():
 def test_interpolated_poses_lie_between_their_neighbours_in_time():
     room, model = model_of([0, 4])
     stamps = np.array([0, 100, 250, 300, 400], np.int64) * 1_000_000 + START_NS
-    trajectory = localize_sfm(stamps, np.array([0, 4]), model, room.scan_from_sfm)
+    trajectory = localize_sfm(stamps, np.array([0, 4]), [PlacedModel(model, room.scan_from_sfm)])
     first, last = (trajectory.pose(i) for i in (0, 4))
     whole = rotation_angle_rad(first.rotation, last.rotation)
     for index, share in ((1, 0.25), (2, 0.625), (3, 0.75)):
@@ -56,14 +58,14 @@ def test_interpolated_poses_lie_between_their_neighbours_in_time():
 
 def test_a_longer_gap_may_be_allowed():
     room, model = model_of([0, 15])
-    arguments = (times(16), np.array([0, 15]), model, room.scan_from_sfm)
+    arguments = (times(16), np.array([0, 15]), [PlacedModel(model, room.scan_from_sfm)])
     assert localize_sfm(*arguments).has_pose.sum() == 2
     assert localize_sfm(*arguments, LocalizeSfmOptions(max_gap_s=1.5)).has_pose.all()
 
 
 def test_no_registered_image_gives_no_pose():
     room, model = model_of([-1, -1])
-    assert not localize_sfm(times(5), np.array([0, 4]), model, room.scan_from_sfm).has_pose.any()
+    assert not localize_sfm(times(5), np.array([0, 4]), [PlacedModel(model, room.scan_from_sfm)]).has_pose.any()
 
 
 @pytest.mark.parametrize(
@@ -73,7 +75,7 @@ def test_no_registered_image_gives_no_pose():
 def test_a_model_of_another_recording_is_refused(frames, keyframes, sentence):
     room, model = model_of(frames)
     with pytest.raises(GeometryError, match=sentence):
-        localize_sfm(times(5), np.array(keyframes), model, room.scan_from_sfm)
+        localize_sfm(times(5), np.array(keyframes), [PlacedModel(model, room.scan_from_sfm)])
 
 
 def test_within_gaps_agrees_with_its_definition():
@@ -91,6 +93,31 @@ def test_within_gaps_agrees_with_its_definition():
 
 def test_poses_do_not_depend_on_the_epoch():
     room, model = model_of([0, 4])
-    early = localize_sfm(times(5) - START_NS, np.array([0, 4]), model, room.scan_from_sfm)
-    late = localize_sfm(times(5), np.array([0, 4]), model, room.scan_from_sfm)
+    early = localize_sfm(times(5) - START_NS, np.array([0, 4]), [PlacedModel(model, room.scan_from_sfm)])
+    late = localize_sfm(times(5), np.array([0, 4]), [PlacedModel(model, room.scan_from_sfm)])
     np.testing.assert_array_equal(early.centers, late.centers)
+
+
+def test_a_frame_in_two_pieces_takes_its_pose_from_the_larger_one():
+    room, model = model_of([0, 3, 6])
+    _, other = model_of([6, 9])
+    elsewhere = Similarity(1.0, Rotation.identity(), np.array([5.0, 0.0, 0.0])) * room.scan_from_sfm
+    pieces = [PlacedModel(model, room.scan_from_sfm), PlacedModel(other, elsewhere)]
+    trajectory = localize_sfm(times(10), np.array([0, 3, 6, 9]), pieces)
+    np.testing.assert_allclose(trajectory.pose(6).translation, room.scan_from_camera[2].translation, atol=1e-9)
+    np.testing.assert_allclose(
+        trajectory.pose(9).translation, elsewhere.compose_pose(other.sfm_from_camera[1]).translation, atol=1e-9
+    )
+
+
+def test_nothing_is_interpolated_from_one_piece_to_another():
+    room, model = model_of([0, 2])
+    _, other = model_of([4, 6])
+    pieces = [PlacedModel(model, room.scan_from_sfm), PlacedModel(other, room.scan_from_sfm)]
+    trajectory = localize_sfm(times(7), np.array([0, 2, 4, 6]), pieces)
+    expected = ["registered", "interpolated", "registered", "none", "registered", "interpolated", "registered"]
+    assert trajectory.status.tolist() == expected
+
+
+def test_no_piece_with_a_place_gives_no_pose():
+    assert not localize_sfm(times(5), np.array([0, 4]), []).has_pose.any()

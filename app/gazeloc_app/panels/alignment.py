@@ -18,6 +18,7 @@ METHODS = {
     "keypoints": "keypoints",
     "icp-point-to-point": "ICP, point to point",
     "icp-point-to-plane": "ICP, point to plane",
+    "shape": "shape alone",
     "given": "given",
 }
 
