@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gazeloc_app.app import serve
 from gazeloc_core import __version__
-from gazeloc_core.errors import GazelocError, InputError
-from gazeloc_core.files import read_json
+from gazeloc_core.errors import GazelocError
 from gazeloc_core.hashing import FileHasher
-from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.project import Project
 from gazeloc_core.resources import sample_scene
+from gazeloc_core.scene_project import scene_settings
 
 SCENE = "studio"
 
@@ -29,21 +29,6 @@ def demo_project(folder: Path) -> Project:
     if (target / "project.json").is_file():
         return Project.open(target)
     return Project.create(target, scene_settings(scene))
-
-
-def scene_settings(scene: Path, *, with_colmap: bool = True) -> Settings:
-    """The project settings for a sample scene's folder, from its scene.json."""
-    facts = read_json(scene / "scene.json", "what a sample scene consists of")
-    try:
-        recording = RecordingEntry(
-            path=scene / facts["recording"],
-            colmap=scene / facts["colmap"] if with_colmap else None,
-            truth=scene / facts["truth"],
-        )
-        tags = TagEntry(family=facts["tag_family"], size_m=facts["tag_size_m"])
-        return Settings(scan=ScanEntry(path=scene / facts["scan"]), tags=tags, recordings={"glasses": recording})
-    except KeyError as error:
-        raise InputError.of(scene / "scene.json", f"the field {error} is missing", "write the scene anew") from error
 
 
 def _folder() -> Path:

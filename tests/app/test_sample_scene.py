@@ -9,13 +9,13 @@ import numpy as np
 import pycolmap
 import pytest
 from data import SAMPLE_SCENES
-from gazeloc_app.demo import scene_settings
 
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
 from gazeloc_core.camera import Camera
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
+from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.stages import inputs, registration
 from gazeloc_core.truth import read_tum
 

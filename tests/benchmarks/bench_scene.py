@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from bench_alignment import bench_icp, bench_keypoints, of_project
-from gazeloc_app.demo import scene_settings
 
 from gazeloc_core import pipeline
 from gazeloc_core.project import Project
+from gazeloc_core.scene_project import scene_settings
 
 Row = tuple[str, str, bool]
 BUDGET_S = 240.0
