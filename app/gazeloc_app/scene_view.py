@@ -21,7 +21,7 @@ from gazeloc_app.scene.frames import SelectedFrameLayer
 from gazeloc_app.scene.frusta import FrustaLayer
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.keypoints import KeypointsLayer
-from gazeloc_app.scene.room import RoomLayer, facing
+from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.state import AppState, Layer
@@ -31,6 +31,7 @@ from gazeloc_core.display_mesh import display_mesh
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
+from gazeloc_core.viewpoint import facing
 
 GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
 METHOD_COLORS = {

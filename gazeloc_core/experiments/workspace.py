@@ -13,10 +13,13 @@ from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
+from gazeloc_core.resources import sample_scene
 from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.synthetic import PRESETS, write_scene
 
+SAMPLE = "studio"
 Size = Literal["full", "small"]
+TABLE_2 = ("table2-a-plain", "table2-a-hard", "table2-b-plain", "table2-b-hard")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +35,8 @@ class Workspace:
 
     def scene(self, preset: str, report: Report = silent) -> Path:
         """The files of a scene, written where they are not there yet."""
+        if preset == SAMPLE:
+            return sample_scene(SAMPLE)
         options = PRESETS[preset]
         folder = self.cache / f"{preset}-{hash_of_value(asdict(options))[:10]}"
         if not (folder / "scene.json").is_file():
@@ -42,7 +47,7 @@ class Workspace:
     def project(self, preset: str, methods: Sequence[Method], report: Report = silent) -> Project:
         """The project of a scene, in which these methods have run. Recordings keep what is fresh."""
         scene = self.scene(preset, part(report, 0, 0.3))
-        folder = scene.with_name(f"{scene.name}-project")
+        folder = self.cache / f"{scene.name}-project"
         if (folder / "project.json").is_file():
             project = Project.open(folder)
         else:
@@ -52,3 +57,14 @@ class Workspace:
                 share = part(report, 0.3 + 0.7 * number / len(methods), 0.3 + 0.7 * (number + 1) / len(methods))
                 pipeline.run(project, method=method, report=share)
         return project
+
+    def open_project(self, methods: Sequence[Method], report: Report = silent) -> Project:
+        """The user's project as it is, else that of our first scene with these methods run."""
+        if self.project_folder is not None:
+            return Project.open(self.project_folder)
+        return self.project(self.presets[0], methods, report)
+
+    @property
+    def presets(self) -> tuple[str, ...]:
+        """The scenes of Table II; for a small run the sample scene's own kind alone."""
+        return TABLE_2 if self.size == "full" else (SAMPLE,)

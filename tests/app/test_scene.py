@@ -8,7 +8,7 @@ from gazeloc_app.scene.frames import FrameInSceneLayer, SelectedFrameLayer, look
 from gazeloc_app.scene.frusta import LINES_PER_FRUSTUM, FrustaLayer, frustum_segments
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.keypoints import SELECTED, KeypointsLayer
-from gazeloc_app.scene.room import RoomLayer, facing
+from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import SCAN_TAGS, TagsLayer
 from gazeloc_app.scene.view import FOV_RAD, overview, set_start, up_vector
 from gazeloc_app.server import make_server
@@ -19,6 +19,7 @@ from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.scan import Mesh, Texture
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
+from gazeloc_core.viewpoint import facing
 
 CAMERA = Camera.pinhole(320, 240, 260.0, 250.0, 170.0, 112.0)
 BOX = Mesh(

@@ -13,7 +13,7 @@ from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import PLANE_M, FrameInSceneLayer, SelectedFrameLayer, look_through
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.keypoints import SCAN_SIDE, KeypointsLayer
-from gazeloc_app.scene.room import RoomLayer, facing
+from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -24,6 +24,7 @@ from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
+from gazeloc_core.viewpoint import facing
 
 pytestmark = pytest.mark.e2e
 

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
-import numpy as np
 import viser
-from numpy.typing import ArrayLike
 
 from gazeloc_core.glb import WHITE, Glb, Rgb, mesh_glb
 from gazeloc_core.scan import Mesh
-
-_CLEAR_MAJORITY = 0.65
-"""Share of the mesh's area that must face the viewpoints before back sides are hidden."""
 
 
 class RoomLayer:
@@ -65,22 +58,3 @@ class RoomLayer:
             receive_shadow=False,
             visible=self._visible,
         )
-
-
-def facing(mesh: Mesh, viewpoints: ArrayLike) -> tuple[Mesh, bool]:
-    """The mesh with its faces turned towards `viewpoints` (N, 3), from where it was scanned, and whether that is clear.
-
-    Only where it is clear may faces be hidden from behind. Every face votes with its area, by the side of it on which
-    the viewpoints' median lies.
-    """
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    normals = np.cross(b - a, c - a)
-    towards = np.median(np.asarray(viewpoints, dtype=np.float64).reshape(-1, 3), axis=0) - (a + b + c) / 3
-    area = np.linalg.norm(normals, axis=1)
-    share = float(area[np.einsum("ij,ij->i", normals, towards) > 0].sum() / max(area.sum(), 1e-30))
-    if share >= 0.5:
-        return mesh, share >= _CLEAR_MAJORITY
-    texture = mesh.texture
-    if texture is not None:
-        texture = dataclasses.replace(texture, uv_of_corner=texture.uv_of_corner[:, ::-1])
-    return dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], texture=texture), 1 - share >= _CLEAR_MAJORITY
