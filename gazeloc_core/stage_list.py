@@ -15,7 +15,7 @@ from gazeloc_core.artifacts import Artifact
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report
 from gazeloc_core.project import Project
-from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan
+from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan, tags
 
 Run = Callable[[Project, str, Report], object]
 Inputs = Callable[[Project, str], Mapping[str, str]]
@@ -212,6 +212,16 @@ STAGES: tuple[Stage, ...] = (
         "Align by shape alone",
         lambda project, name, report: baselines.align_globally(project, name, report=report),
         baselines.global_inputs,
+    ),
+    *_poses_and_gaze(
+        Method.TAGS,
+        lambda project, name, report: tags.place_tags(project, name, report=report),
+        tags.tags_inputs,
+    ),
+    *_poses_and_gaze(
+        Method.TAGS_PAPER,
+        lambda project, name, report: tags.place_tags_paper(project, name, report=report),
+        tags.tags_paper_inputs,
     ),
     *_poses_by_alignment(Method.SFM_PAPER),
     *_poses_by_alignment(Method.GLOBAL),

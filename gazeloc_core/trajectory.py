@@ -100,6 +100,15 @@ class Trajectory:
         """(N,) whether each frame was localised by what it shows itself: registered, or by its tags."""
         return np.isin(self.status, [PoseStatus.REGISTERED.value, PoseStatus.TAG_ONLY.value])
 
+    def counts(self) -> dict[str, int]:
+        """How many frames there are, and how many of which kind."""
+        return {
+            "frames": len(self),
+            "keyframes": int(self.is_keyframe.sum()),
+            "localised": int(self.is_localised.sum()),
+            "with a pose": int(self.has_pose.sum()),
+        }
+
     def pose(self, index: int) -> RigidTransform | None:
         """`scan_from_camera` of one frame, None where it has no pose."""
         if not PoseStatus(str(self.status[index])).has_pose:

@@ -45,7 +45,7 @@ def localize_sfm(
     """
     options = options or LocalizeSfmOptions()
     times = np.asarray(timestamp_ns, dtype=np.int64)
-    is_keyframe = _mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
+    is_keyframe = frame_mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
     status = np.full(len(times), PoseStatus.NONE.value, dtype="U16")
     frames, owner, poses = _registered(placed, len(times))
     if poses is None:
@@ -70,7 +70,7 @@ def _registered(placed: Sequence[PlacedModel], count: int) -> tuple[Ints, Ints, 
     poses: list[RigidTransform] = []
     for number, piece in enumerate(placed):
         images = np.flatnonzero(piece.model.frame_indices >= 0)
-        _mask(piece.model.frame_indices[images], count, "images of the reconstruction")
+        frame_mask(piece.model.frame_indices[images], count, "images of the reconstruction")
         images = images[owner[piece.model.frame_indices[images]] < 0]
         if len(images) == 0:
             continue
@@ -100,7 +100,12 @@ def within_gaps(at_ns: Ints, known_ns: Ints, max_gap_s: float) -> Bools:
     return np.asarray(inside & (exact | short), dtype=np.bool_)
 
 
-def _mask(indices: Ints, count: int, what: str) -> Bools:
+def frame_mask(indices: Ints, count: int, what: str) -> Bools:
+    """(N,) true at these frames of a recording with `count` frames.
+
+    Raises:
+        GeometryError: if a frame is not of the recording or named twice; `what` names them in the sentence.
+    """
     mask = np.zeros(count, dtype=np.bool_)
     if len(indices) and (indices.min() < 0 or indices.max() >= count):
         raise GeometryError(

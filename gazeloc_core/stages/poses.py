@@ -17,6 +17,7 @@ from gazeloc_core.stages.baselines import method_alignment
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.registration import chosen_alignment
+from gazeloc_core.stages.tags import tags_inputs, tags_paper_inputs
 from gazeloc_core.trajectory import Trajectory
 
 
@@ -95,13 +96,21 @@ def _place_models(
         options=asdict(options),
         inputs=depends,
         notes=notes,
-        stats=_counts(trajectory),
+        stats=trajectory.counts(),
     )
     return trajectory
 
 
 def _inputs_of(project: Project, recording: str, method: Method) -> dict[str, str]:
-    return sfm_inputs(project, recording) if method is Method.SFM else method_inputs(project, recording, method)
+    match method:
+        case Method.SFM:
+            return sfm_inputs(project, recording)
+        case Method.TAGS:
+            return tags_inputs(project, recording)
+        case Method.TAGS_PAPER:
+            return tags_paper_inputs(project, recording)
+        case Method.SFM_PAPER | Method.GLOBAL:
+            return method_inputs(project, recording, method)
 
 
 def fresh_trajectory(project: Project, recording: str, method: Method = Method.SFM) -> Trajectory:
@@ -136,12 +145,3 @@ def _is_fresh(project: Project, recording: str, method: Method) -> bool:
     except GazelocError:  # an earlier stage has no result any more
         return False
     return project.result(recording, method, "trajectory").state(expected)[0] is State.FRESH
-
-
-def _counts(trajectory: Trajectory) -> dict[str, int]:
-    return {
-        "frames": len(trajectory),
-        "keyframes": int(trajectory.is_keyframe.sum()),
-        "registered": int(trajectory.is_registered.sum()),
-        "with a pose": int(trajectory.has_pose.sum()),
-    }
