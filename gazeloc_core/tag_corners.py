@@ -214,7 +214,7 @@ def triangulate_sfm_corners(
     options = options or SfmCornerOptions()
     row_of = {int(index): row for row, index in enumerate(model.frame_indices) if index >= 0}
     rows = np.array([row_of.get(int(index), -1) for index in sightings.frame_index], dtype=np.int64)
-    seen = _pick(sightings, rows >= 0)
+    seen = sightings.pick(rows >= 0)
     poses = model.sfm_from_camera[rows[rows >= 0]]
     if len(seen) == 0:
         return _columns({}, [])
@@ -251,10 +251,6 @@ def _columns(found: dict[int, _Tag], notes: list[str]) -> TagCorners:
         np.array([tag.spread for tag in found.values()], dtype=np.float64),
         tuple(notes),
     )
-
-
-def _pick(sightings: TagSightings, which: Bools) -> TagSightings:
-    return TagSightings(*(getattr(sightings, name)[which] for name in vars(sightings)))
 
 
 def _point_of(sightings: TagSightings) -> Ints:

@@ -15,7 +15,10 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import HALF_PIXEL, Camera
+from gazeloc_core.tag_pose import apriltag_poses
 from gazeloc_core.tag_square import UNIT_SQUARE
+from gazeloc_core.tag_types import TagSightings
+from gazeloc_core.transforms import rigid, rotation_from_matrix
 
 OUTLINE = (120, 255, 120)
 FIRST_CORNER = (255, 120, 255)
@@ -56,6 +59,24 @@ class DrawnTag:
     tag_id: int
     corners_px: Floats
     camera_from_tag: RigidTransform | None = None
+
+
+def drawn_tags(sightings: TagSightings, frame: int, camera: Camera, size_m: float | None) -> list[DrawnTag]:
+    """The tags of one frame, with their poses where the size is known, ready to be drawn (figure 2)."""
+    mine = sightings.pick(np.flatnonzero(sightings.frame_index == frame))
+    if size_m is None or len(mine) == 0:
+        return [DrawnTag(int(i), corners) for i, corners in zip(mine.tag_id, mine.corners_px, strict=True)]
+    poses = apriltag_poses(mine.corners_px, camera, size_m)
+    return [
+        DrawnTag(int(mine.tag_id[i]), mine.corners_px[i], _pose(poses.rotation[i, 0], poses.translation[i, 0]))
+        for i in range(len(mine))
+    ]
+
+
+def _pose(rotation: Floats, translation: Floats) -> RigidTransform | None:
+    if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
+        return None
+    return rigid(rotation_from_matrix(rotation, "a tag's rotation"), translation, "pose of a tag")
 
 
 def draw_tags(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gazeloc_core.arrays import Floats, Ints, frozen
+from gazeloc_core.arrays import Bools, Floats, Ints, frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,12 @@ class TagSightings:
 
     def __len__(self) -> int:
         return len(self.tag_id)
+
+    def pick(self, which: Bools | Ints) -> TagSightings:
+        """Some of the sightings, by mask (S,) or by rows."""
+        return TagSightings(
+            self.frame_index[which], self.tag_id[which], self.corners_px[which], self.decision_margin[which]
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -235,6 +235,7 @@ class OpenRecording:
             AppState(state.recordings, self.recording, self.annotation),
             layers=state.layers,
             compared=state.compared,
+            draws_tags=state.draws_tags,
             data_revision=state.data_revision + 1,
             renderer_note=state.renderer_note,
             jobs_started=state.jobs_started,
@@ -250,6 +251,17 @@ class ShowFrame:
     def apply(self, state: AppState) -> AppState:
         """The state with the frame."""
         return replace(state, frame=max(0, self.frame))
+
+
+@dataclass(frozen=True)
+class DrawTags:
+    """The tags that were found shall be drawn into the frame, or not."""
+
+    is_on: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return replace(state, draws_tags=self.is_on)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.export import ExportPanel
+from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
@@ -31,7 +32,7 @@ from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.project import JobBar, ProjectPanel
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import Describe, Sources
+from gazeloc_app.render_worker import Describe, SeenTags, Sources
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
@@ -121,6 +122,8 @@ class App:
             alignment_panel = AlignmentPanel(gui, self.data, dispatch)
         with tabs.add_tab("Methods"):
             method_panel = MethodPanel(gui, self.data, dispatch)
+        with tabs.add_tab("Figures"):
+            figure_panel = FigurePanel(gui, self.data, dispatch)
         with tabs.add_tab("Layers"):
             layer_panel = LayerPanel(gui, dispatch)
         with tabs.add_tab("Export"):
@@ -130,8 +133,9 @@ class App:
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
         side.dock_left()
         side.set_width(430)
-        main = (project_panel, keypoint_panel, alignment_panel, method_panel, layer_panel, export_panel)
-        for panel in (job_bar, *main, frame_panel):
+        work = (project_panel, keypoint_panel, alignment_panel)
+        looks = (method_panel, figure_panel, layer_panel, export_panel, frame_panel)
+        for panel in (job_bar, *work, *looks):
             self.store.add_view(panel.render)
 
     def _routes(self) -> Routes:
@@ -259,4 +263,11 @@ def _annotation(project: Project, recording: str) -> Annotation:
 
 def _sources(project: Project) -> Sources:
     recordings = {name: partial(inputs.load_recording, project, name) for name in project.settings.recordings}
-    return Sources(mesh=partial(inputs.load_mesh, project), recordings=recordings)
+    tags = {name: partial(_seen_tags, project, name) for name in project.settings.recordings}
+    return Sources(mesh=partial(inputs.load_mesh, project), recordings=recordings, tags=tags)
+
+
+def _seen_tags(project: Project, recording: str) -> SeenTags:
+    artifact, entry = project.artifact(recording, "tags"), project.settings.tags
+    sightings = inputs.load_sightings(artifact.read_arrays())
+    return SeenTags(sightings, entry.size_m if entry else None)

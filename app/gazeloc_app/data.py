@@ -16,17 +16,20 @@ from gazeloc_core.alignment import Alignment
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.artifacts import HEADER, Artifact
 from gazeloc_core.camera import Camera
+from gazeloc_core.charts import Drawing
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.evaluate import evaluate, match_times
 from gazeloc_core.files import read_json
 from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.methods import Method
+from gazeloc_core.paper_keypoints import SfmTagCenters, sfm_tag_centers
 from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
 from gazeloc_core.stages import inputs, registration
+from gazeloc_core.stages.figures import load_figures
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.tag_types import TagCorners
@@ -190,6 +193,23 @@ class ProjectData:
         return self._remember_or_say(
             f"{recording} errors {method_of(key)}", trajectory, lambda: _frame_errors(trajectory, truth)
         )
+
+    def figures(self, recording: str) -> tuple[dict[str, Drawing], tuple[str, ...]] | None:
+        """The charts that were drawn for a recording, and why others are missing; None before they were drawn."""
+        artifact = self.project.artifact(recording, "figures")
+        return self._read(f"{recording} figures", artifact, lambda: load_figures(self.project, recording))
+
+    def tag_points(self, recording: str) -> SfmTagCenters | None:
+        """The reconstruction's points under tags (figure 9); None without tags or a reconstruction."""
+        model, camera = self.model(recording), self.camera(recording)
+        artifact = self.project.artifact(recording, "tags")
+        stamp = _stamp(artifact)
+        if model is None or camera is None or stamp is None:
+            return None
+        load = lambda: sfm_tag_centers(  # noqa: E731
+            model, camera, inputs.load_sightings(artifact.read_arrays())
+        )
+        return self._remember_or_say(f"{recording} tag points", (stamp, model), load)
 
     def _read(self, name: str, artifact: Artifact, load: Callable[[], T]) -> T | None:
         """What `load` reads of an artifact; None where it is not there or damaged."""

@@ -34,9 +34,9 @@ class Pictures:
         self._asked: dict[Frame | Render, Future[Any]] = {}
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
-        """A frame, undistorted, as JPEG."""
-        del query
-        return await self._picture("frame", recording, index, Frame(recording=recording, index=index, width=WIDTH_PX))
+        """A frame, undistorted, as JPEG; with `tags=1` the tags in it are drawn."""
+        job = Frame(recording=recording, index=index, width=WIDTH_PX, with_tags=query.get("tags") == "1")
+        return await self._picture("frame", recording, index, job)
 
     async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG."""

@@ -21,11 +21,21 @@ from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.render import RayRenderer, Rendered, Renderer, open_renderer
 from gazeloc_core.scan import Mesh
+from gazeloc_core.tag_drawing import draw_tags, drawn_tags
+from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.transforms import rigid_from_wxyz
 from gazeloc_core.undistort import Undistorter
 
 JPEG_QUALITY = 90
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class SeenTags:
+    """The tags in a recording's undistorted frames, and their size in metres where it is known."""
+
+    sightings: TagSightings
+    size_m: float | None
 
 
 @dataclass(frozen=True)
@@ -34,6 +44,8 @@ class Sources:
 
     mesh: Callable[[], Mesh]
     recordings: Mapping[str, Callable[[], Recording]] = field(default_factory=dict)
+    tags: Mapping[str, Callable[[], SeenTags]] = field(default_factory=dict)
+    """What `Frame.with_tags` draws, by recording."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +63,15 @@ class Render:
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """A recording's frame: JPEG bytes, undistorted unless `as_recorded`; `width` scales it down, 0 leaves it."""
+    """A recording's frame: JPEG bytes, undistorted unless `as_recorded`; `width` scales it down, 0 leaves it.
+
+    `with_tags` draws the tags that were found in it, with outline, id, axes and a cube.
+    """
 
     recording: str
     index: int
     as_recorded: bool = False
+    with_tags: bool = False
     width: int = 0
 
 
@@ -166,7 +182,14 @@ class _Studio:
         if not 0 <= job.index < len(recording):
             raise InputError(f"There is no frame {job.index}; the recording {job.recording!r} has {len(recording)}.")
         image = recording.frames.read(job.index)
-        return image if job.as_recorded else undistorter.image(image)
+        if job.as_recorded:
+            return image
+        image = undistorter.image(image)
+        if job.with_tags and job.recording in self._sources.tags:
+            seen = self._sources.tags[job.recording]()
+            tags = drawn_tags(seen.sightings, job.index, undistorter.target, seen.size_m)
+            image = draw_tags(image, tags, undistorter.target, seen.size_m)
+        return image
 
     def _cast(self, job: Cast) -> CastAnswer:
         caster = self._caster()

@@ -29,6 +29,8 @@ from gazeloc_core.arrays import Bytes
 from gazeloc_core.camera import Camera
 from gazeloc_core.display_mesh import display_mesh
 from gazeloc_core.methods import Method
+from gazeloc_core.palette import colors_of_ids
+from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
 from gazeloc_core.viewpoint import facing
@@ -44,6 +46,8 @@ METHOD_COLORS = {
 """Of methods that are compared with the chosen one, which is always red."""
 SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
 WHITE = (255, 255, 255)
+FILTERED_OUT = (120, 120, 120)
+"""Points under a tag that the paper's filter drops."""
 BACKGROUND = (233, 236, 239)
 """Light, but not white: holes in the scan are seen as holes, white walls as walls."""
 THUMBNAIL_PX = 320
@@ -63,6 +67,7 @@ class SceneView:
         """Which side of the scan's faces is drawn: 1 where their normals point to, -1 the other, 0 both."""
         self._room = RoomLayer(scene)
         self._cloud = CloudLayer(scene)
+        self._tag_points = CloudLayer(scene, "/sfm/tag-points", point_size_m=0.022)
         self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
         self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
         self._phone = FrustaLayer(scene, "phone", BLUE, depth_m=0.08)
@@ -117,8 +122,23 @@ class SceneView:
                 None if model is None else model.points, None if model is None else model.point_colors, tint
             ),
         )
+        if state.layers.is_visible(Layer.TAG_POINTS):
+            self._draw_tag_points(state, model)
         if scan_from_sfm is not None:
-            self._once("place", _numbers(scan_from_sfm), lambda: self._cloud.align(scan_from_sfm))
+            for layer in (self._cloud, self._tag_points):
+                layer.align(scan_from_sfm)
+
+    def _draw_tag_points(self, state: AppState, model: SfmModel | None) -> None:
+        found = self._data.tag_points(state.recording)
+
+        def show() -> None:
+            if found is None or model is None:
+                self._tag_points.show(None, None)
+                return
+            colors = np.where(found.is_kept[:, None], colors_of_ids(found.point_tag), FILTERED_OUT).astype(np.uint8)
+            self._tag_points.show(model.points[found.point], colors)
+
+        self._once("tag points", found, show)
 
     def _draw_tags(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
         on_scan, in_sfm = self._data.scan_tags(), self._data.sfm_tags(state.recording)
@@ -202,6 +222,7 @@ class SceneView:
             Layer.TRUTH: (self._truth,),
             Layer.ESTIMATE: (self._estimate, self._selected, *self._compared.values()),
             Layer.KEYPOINTS: (self._keypoints,),
+            Layer.TAG_POINTS: (self._tag_points,),
             Layer.GAZE: (self._gaze,),
         }
         for layer, parts in layers.items():

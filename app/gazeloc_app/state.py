@@ -26,6 +26,7 @@ class Layer(StrEnum):
     TRUTH = "Ground truth"
     ESTIMATE = "Estimate"
     KEYPOINTS = "Keypoints"
+    TAG_POINTS = "Points under tags"
     GAZE = "Gaze"
 
 
@@ -75,7 +76,7 @@ class Annotation:
 class LayerSettings:
     """Which layers show, and how they are tinted (RGB; None for a layer's own colours)."""
 
-    hidden: frozenset[Layer] = frozenset()
+    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS})
     tints: tuple[tuple[Layer, tuple[int, int, int]], ...] = ()
 
     def is_visible(self, layer: Layer) -> bool:
@@ -113,6 +114,8 @@ class AppState:
     layers: LayerSettings = field(default_factory=LayerSettings)
     compared: frozenset[Method] = frozenset()
     """Methods whose poses show in the scene beside those of the method that was chosen."""
+    draws_tags: bool = False
+    """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None
     jobs_started: int = 0
     notice: Notice | None = None

@@ -10,7 +10,7 @@ from gazeloc_core import pipeline
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
-from gazeloc_core.stages import registration
+from gazeloc_core.stages import figures, registration
 
 _LEVELS = {"good": Level.INFO, "warning": Level.WARNING, "bad": Level.ERROR}
 
@@ -75,3 +75,14 @@ def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, 
         target = Path(output).expanduser() / format
         files += len(pipeline.export(project, format=format, output=target, recording=recording, report=share))
     return Outcome(f"{files} files were written to {output}. Exported frames show people: treat them with care.")
+
+
+def draw_figures(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """The paper's figures for this recording."""
+    project = Project.open(folder)
+    charts = figures.draw_figures(project, recording, report)
+    if not charts:
+        return Outcome(
+            "There is nothing to draw: " + " ".join(figures.load_figures(project, recording)[1]), Level.WARNING
+        )
+    return Outcome(f"{len(charts)} figures were drawn.")

@@ -39,8 +39,8 @@ def figures_11_to_13(workspace: Workspace, report: Report) -> Finding:
         pictures[f"renders-{name}"] = render_picture(project, name)
     text = (
         "Cameras of each method in the scan (figures 11 and 12): green is the truth, red the estimate. Below, frames "
-        "of the recording beside renders of the scan from the poses of each method (figure 13); a method without a pose "
-        "for a frame shows none. Frames were taken evenly from those that the shown methods were asked for."
+        "of the recording beside renders of the scan from the poses of each method (figure 13); a method without a "
+        "pose for a frame shows none. Frames were taken evenly from those that the shown methods were asked for."
     )
     return Finding(text=text, pictures=pictures)
 

@@ -68,3 +68,8 @@ class Workspace:
     def presets(self) -> tuple[str, ...]:
         """The scenes of Table II; for a small run the sample scene's own kind alone."""
         return TABLE_2 if self.size == "full" else (SAMPLE,)
+
+    def describe(self) -> list[object]:
+        """What findings depend on beside the code: sizes, scenes and the user's own data, as plain values."""
+        scenes = [asdict(PRESETS[preset]) for preset in self.presets]
+        return [self.size, scenes, str(self.project_folder), [str(folder) for folder in self.arkitscenes]]

@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import RigidTransform
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -23,67 +21,24 @@ from box_room import make_room, perturbed
 from gazeloc_core.alignment import Alignment, align, judge
 from gazeloc_core.arrays import Floats
 from gazeloc_core.correspondences import Correspondences
-from gazeloc_core.evaluate import match_times, pose_errors
-from gazeloc_core.icp import IcpOptions, Target, choose_points
+from gazeloc_core.evaluate import match_times
+from gazeloc_core.experiments.case import Case
 from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.refine import Refinement, refine
-from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import fit_similarity
-from gazeloc_core.stages import inputs, registration
-from gazeloc_core.transforms import Similarity
+from gazeloc_core.stages import registration
 from gazeloc_core.truth import read_tum
 
 CM = 0.01
 
 
-@dataclass(frozen=True)
-class Bench:
-    """A reconstruction with true poses of its images, and the mesh to align it with."""
-
-    name: str
-    model: SfmModel
-    truth: RigidTransform
-    raycaster: Raycaster
-
-    @property
-    def best(self) -> Similarity:
-        """The similarity that fits the reconstruction's camera centres to the true ones: what an exact start is."""
-        return fit_similarity(np.array(self.model.sfm_from_camera.translation), np.array(self.truth.translation))
-
-    def errors(self, scan_from_sfm: Similarity) -> tuple[float, float]:
-        """Mean position error in metres and rotation error in degrees."""
-        rotation_deg, position_m = pose_errors(scan_from_sfm.compose_pose(self.model.sfm_from_camera), self.truth)
-        return float(position_m.mean()), float(rotation_deg.mean())
-
-    def clicked(self, count: int, sigma_m: float, seed: int) -> Correspondences:
-        """Pairs far apart, as a careful person chooses them: at well measured points, noisy on both sides."""
-        rng = np.random.default_rng(seed)
-        options = IcpOptions(voxel_m=0.2, schedule_m=(0.1,))
-        points = choose_points(self.model, self.best, Target(self.raycaster), options)
-        # A careful person clicks several of the far places, not exactly the farthest: from a random third of them.
-        chosen = _far_apart(points[rng.permutation(len(points))[: max(len(points) // 3, count)]], count)
-        names = tuple(f"point {i}" for i in range(count))
-        scan = self.best.apply(chosen) + rng.normal(0, sigma_m, (count, 3))
-        sfm = chosen + rng.normal(0, sigma_m, (count, 3)) / self.best.scale
-        return Correspondences(names, names, sfm, scan, np.full(count, max(sigma_m, 0.005) * np.sqrt(2)))
-
-
-def _far_apart(points: Floats, count: int) -> Floats:
-    chosen = [0]
-    while len(chosen) < count:
-        distance = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
-        chosen.append(int(distance.argmax()))
-    return points[chosen]
-
-
-def box_room() -> Bench:
+def box_room() -> Case:
     """The room of the tests: 4000 points with 1 cm noise, a mesh with 5 mm noise."""
     room = make_room(point_noise_m=0.01, mesh_noise_m=0.005)
-    return Bench("box room", room.model, room.scan_from_camera, Raycaster(room.mesh))
+    return Case("box room", room.model, Raycaster(room.mesh), np.arange(len(room.model)), room.scan_from_camera)
 
 
-def bench_keypoints(bench: Bench, draws: int = 100) -> list[tuple[str, str, bool]]:
+def bench_keypoints(bench: Case, draws: int = 100) -> list[tuple[str, str, bool]]:
     """Six clicked pairs with 1 cm of noise on both sides: mean over draws <= 2 cm and <= 0.35 degrees."""
     alignments = [align(bench.clicked(6, CM, seed)) for seed in range(draws)]
     position, rotation = np.mean([bench.errors(alignment.scan_from_sfm) for alignment in alignments], axis=0)
@@ -92,7 +47,7 @@ def bench_keypoints(bench: Bench, draws: int = 100) -> list[tuple[str, str, bool
     return [("6 pairs, 1 cm noise on both sides", text, position <= 0.02 and rotation <= 0.35)]
 
 
-def bench_icp(bench: Bench, draws: int = 20, evidence: Correspondences | None = None) -> list[tuple[str, str, bool]]:
+def bench_icp(bench: Case, draws: int = 20, evidence: Correspondences | None = None) -> list[tuple[str, str, bool]]:
     """ICP from starts off by 5 cm and 1 degree, and from an exact start, judged by 8 clicked pairs or by `evidence`."""
     centre = bench.raycaster.mesh.bounds.mean(axis=0)
     rows = []
@@ -111,7 +66,7 @@ def bench_icp(bench: Bench, draws: int = 20, evidence: Correspondences | None = 
 
 
 def _from_exact(
-    bench: Bench, exact: Alignment, draws: int, evidence: Correspondences | None
+    bench: Case, exact: Alignment, draws: int, evidence: Correspondences | None
 ) -> list[tuple[str, str, bool]]:
     rows: list[tuple[str, str, bool]] = [("exact start", _cm_deg(bench.errors(exact.scan_from_sfm)), True)]
     ends = []
@@ -133,7 +88,7 @@ def _cm_deg(errors: Floats | tuple[float, float]) -> str:
     return f"{errors[0] * 100:.2f} cm {errors[1]:.3f}°"
 
 
-def scene(folder: Path) -> Bench:
+def scene(folder: Path) -> Case:
     """A scene of synthetic.py: its scan, recording, COLMAP model, and the truth of the recording's frames."""
     from gazeloc_core.colmap_io import read_model
     from gazeloc_core.colmap_join import join_to_recording
@@ -145,18 +100,12 @@ def scene(folder: Path) -> Bench:
     frames = join_to_recording(model, recording, undistorted_camera(recording.camera))
     times, poses = read_tum(folder / "truth" / "glasses.tum")
     truth = poses[match_times(recording.timestamp_ns[frames], times)]
-    return Bench(folder.name, model, truth, Raycaster(open_scan(folder / "scan").mesh))
+    return Case(folder.name, model, Raycaster(open_scan(folder / "scan").mesh), np.arange(len(model)), truth)
 
 
-def of_project(project: Project, recording: str) -> tuple[Bench, Correspondences]:
+def of_project(project: Project, recording: str) -> tuple[Case, Correspondences]:
     """A project whose stages have run: its own reconstruction, and its tags' corners as evidence."""
-    model = inputs.load_model(project, recording)
-    truth_path = project.recording(recording).truth
-    assert truth_path is not None
-    times, poses = read_tum(truth_path)
-    truth = poses[match_times(inputs.load_recording(project, recording).timestamp_ns[model.frame_indices], times)]
-    bench = Bench(recording, model, truth, inputs.load_raycaster(project))
-    return bench, registration.correspondences(project, recording)
+    return Case.of_project(project, recording), registration.correspondences(project, recording)
 
 
 def main() -> int:

@@ -14,7 +14,7 @@ import numpy as np
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.actions import Action, ShowFrame
+from gazeloc_app.actions import Action, DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
 from gazeloc_app.gaze_at import gaze_in_frame
 from gazeloc_app.sightings import image_of_frame
@@ -61,7 +61,11 @@ class FramePanel:
             "Look through this camera",
             hint="Of frames in the reconstruction, keyframes that is. Clicks in the frame can then make keypoints.",
         )
+        self._tags = gui.add_checkbox(
+            "Draw tags", False, hint="Outline, id, axes and a cube of each tag that was found in the frame."
+        )
         self._facts = gui.add_html("")
+        widgets.on_user(self._tags, lambda event: self._dispatch(DrawTags(bool(event.target.value))))
         widgets.on_user(self._slider, lambda event: self._show(int(event.target.value)))
         widgets.on_user(self._steps, lambda event: self._step(str(event.target.value)), event="on_click")
         widgets.on_user(self._look, lambda event: self._look_through(event.client_id, self._frame()), event="on_click")
@@ -70,7 +74,7 @@ class FramePanel:
         """Show the state's frame."""
         self._state = state
         key = self._data.poses_key(state.recording, state.annotation)
-        seen = (state.recording, state.frame, key, state.data_revision, state.renderer_note)
+        seen = (state.recording, state.frame, key, state.data_revision, state.renderer_note, state.draws_tags)
         if seen == self._seen:
             return
         self._seen = seen
@@ -81,6 +85,7 @@ class FramePanel:
         widgets.set_value(self._slider, frame)
         trajectory = self._data.trajectory(state.recording, key)
         has_pose = trajectory is not None and trajectory.pose(frame) is not None
+        widgets.set_value(self._tags, state.draws_tags)
         widgets.set_property(self._look, "disabled", image_of_frame(self._data, state.recording, frame) is None)
         widgets.set_content(self._comparison, self._comparison_html(state, frame, has_pose))
         if trajectory is not self._strip_of:
@@ -97,6 +102,8 @@ class FramePanel:
         camera = self._data.camera(name)
         gaze = gaze_in_frame(self._data, name, frame, camera)
         url = f"/frames/{quote(name)}/{frame}.jpg?rev={self._revision}"
+        if state.draws_tags:
+            url += f"{state.data_revision}&tags=1"
         values = {
             "FRAME_URL": url,
             "BEFORE_URL": self._before,

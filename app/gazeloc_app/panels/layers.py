@@ -10,7 +10,7 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions import Action, ShowLayer, TintLayer
-from gazeloc_app.state import AppState, Layer
+from gazeloc_app.state import AppState, Layer, LayerSettings
 
 HINTS = {
     Layer.SCAN: "The mesh in its own colours.",
@@ -21,6 +21,7 @@ HINTS = {
     Layer.TRUTH: "The glasses' true poses, green, where the project was given any.",
     Layer.ESTIMATE: "The glasses' estimated poses, red; the frame that is shown, yellow.",
     Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, pink the selected pair.",
+    Layer.TAG_POINTS: "The reconstruction's points under tags: in colour those that the paper's filter keeps, grey the rest.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
@@ -32,7 +33,7 @@ class LayerPanel:
     def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None]):
         self._boxes = {}
         for layer in Layer:
-            box = gui.add_checkbox(layer.value, True, hint=HINTS[layer])
+            box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=HINTS[layer])
             widgets.on_user(box, partial(_show, dispatch, layer))
             self._boxes[layer] = box
         with gui.add_folder("Tint", expand_by_default=False):

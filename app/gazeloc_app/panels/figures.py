@@ -1,0 +1,59 @@
+"""Panel: the paper's figures for the recording that is open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from viser import GuiApi
+
+from gazeloc_app import tasks, widgets
+from gazeloc_app.actions import Action, StartJob
+from gazeloc_app.data import ProjectData
+from gazeloc_app.plots import to_plotly
+from gazeloc_app.state import AppState
+
+NONE = "(not drawn yet)"
+
+
+class FigurePanel:
+    """A button that draws the figures, and the one of them that is shown."""
+
+    def __init__(self, gui: GuiApi, data: ProjectData, dispatch: Callable[[Action], None]):
+        self._data = data
+        self._dispatch = dispatch
+        self._gui = gui
+        self._recording = ""
+        self._seen: object = None
+        self._draw = gui.add_button("Draw the figures", hint="From the tags that were found; takes some seconds.")
+        self._which = gui.add_dropdown("Figure", (NONE,))
+        self._notes = gui.add_html("")
+        self._plot: object = None
+        widgets.on_user(self._draw, lambda _: self._start(), event="on_click")
+        widgets.on_user(self._which, lambda event: self._show(str(event.target.value)))
+
+    def render(self, state: AppState) -> None:
+        """Show the state's recording."""
+        self._recording = state.recording
+        widgets.set_property(self._draw, "disabled", state.job is not None)
+        seen = (state.recording, state.data_revision)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        charts, notes = self._data.figures(state.recording) or ({}, ())
+        options = tuple(charts) or (NONE,)
+        if tuple(self._which.options) != options:
+            self._which.options = options
+        widgets.set_content(self._notes, widgets.box("<br>".join(widgets.text(note) for note in notes)))
+        self._show(str(self._which.value))
+
+    def _show(self, name: str) -> None:
+        charts, _ = self._data.figures(self._recording) or ({}, ())
+        chart = charts.get(name)
+        if self._plot is not None:
+            self._plot.remove()  # type: ignore[attr-defined]
+            self._plot = None
+        if chart is not None:
+            self._plot = self._gui.add_plotly(to_plotly(chart), aspect=0.9)
+
+    def _start(self) -> None:
+        self._dispatch(StartJob("Draw the figures", tasks.draw_figures, (("recording", self._recording),)))
