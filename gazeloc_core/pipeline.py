@@ -23,6 +23,7 @@ __all__ = [
     "evaluate_recording",
     "export",
     "run",
+    "run_after_choice",
     "run_stage",
     "stage_named",
     "statuses",
@@ -111,6 +112,14 @@ def run(
         done += stage.weight
     report(1.0, "done")
     return times
+
+
+def run_after_choice(project: Project, recording: str, method: Method, report: Report = silent) -> None:
+    """Run what follows a choice that a person made in the app: poses and gaze, and for `sfm` the smaller pieces."""
+    names = ("pieces", "trajectory", "gaze") if method is Method.SFM else ("trajectory", "gaze")
+    for number, name in enumerate(names):
+        share = part(report, number / len(names), (number + 1) / len(names))
+        run_stage(project, stage_named(name, method=method), recording, share)
 
 
 def run_stage(project: Project, stage: Stage, name: str | None, report: Report = silent) -> StageTime:

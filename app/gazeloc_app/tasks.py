@@ -66,9 +66,7 @@ def refine(folder: Path, report: Report, *, recording: str, start: str) -> Outco
 def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, ...], output: str) -> Outcome:
     """The poses in the formats asked for, each in a folder of its own below `output`."""
     project = Project.open(folder)
-    method = project.method(recording)
-    pipeline.run_stage(project, pipeline.stage_named("trajectory", method=method), recording, part(report, 0, 0.05))
-    pipeline.run_stage(project, pipeline.stage_named("gaze", method=method), recording, part(report, 0.05, 0.1))
+    pipeline.run_after_choice(project, recording, project.method(recording), part(report, 0, 0.1))
     files = 0
     for position, format in enumerate(formats):
         share = part(report, 0.1 + 0.9 * position / len(formats), 0.1 + 0.9 * (position + 1) / len(formats))

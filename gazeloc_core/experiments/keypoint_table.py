@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gazeloc_core.charts import Chart, Series
 from gazeloc_core.experiments.case import Case
 from gazeloc_core.experiments.finding import Finding

@@ -144,7 +144,8 @@ def load_model(project: Project, recording: str, rank: int = 0) -> SfmModel:
 
 def load_models(project: Project, recording: str) -> list[SfmModel]:
     """All models of the reconstruction, the largest first."""
-    count = int(project.artifact(recording, "reconstruction").header().stats["models"])
+    columns = project.artifact(recording, "reconstruction").read_arrays()
+    count = sum(name.endswith("_image_names") for name in columns)
     return [load_model(project, recording, rank) for rank in range(count)]
 
 

@@ -21,7 +21,7 @@ HINTS = {
     Layer.TRUTH: "The glasses' true poses, green, where the project was given any.",
     Layer.ESTIMATE: "The glasses' estimated poses, red; the frame that is shown, yellow.",
     Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, pink the selected pair.",
-    Layer.TAG_POINTS: "The reconstruction's points under tags: in colour those that the paper's filter keeps, grey the rest.",
+    Layer.TAG_POINTS: "The reconstruction's points under tags; those that the paper's filter drops are grey.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
