@@ -1,4 +1,7 @@
-"""Errors of a trajectory against the truth, as the paper takes them (section VI-B). Nothing is aligned to the truth."""
+"""Errors of a trajectory against the truth, as the paper takes them (section VI-B).
+
+Nothing is aligned to the truth for them; what is, beside the headline, says so in its name (`trajectory_errors`).
+"""
 
 from __future__ import annotations
 
@@ -12,38 +15,20 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_core.arrays import Floats, Ints, frozen
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.trajectory import Trajectory
+from gazeloc_core.trajectory_errors import (
+    AbsoluteError,
+    ErrorSummary,
+    Outliers,
+    RelativeError,
+    pairs_apart,
+    pairs_in_order,
+)
 from gazeloc_core.transforms import rotation_angle_rad
 
 MATCH_NS = 1_000_000
 """A frame and a truth pose belong together when their times differ by no more than this."""
-
-
-@dataclass(frozen=True)
-class ErrorSummary:
-    """`mean`, `median` and `max` over the registered keyframes; `p95` over all keyframes, unregistered ones infinite.
-
-    Infinity stands for "no value" too: the mean of nothing. JSON has no infinity, there it is null.
-    """
-
-    mean: float
-    median: float
-    p95: float
-    max: float
-
-    @classmethod
-    def of(cls, errors: Floats) -> ErrorSummary:
-        """The summary of errors (K,) of all keyframes, infinite for those that were not registered."""
-        finite = errors[np.isfinite(errors)]
-        if len(finite) == 0:
-            return cls(math.inf, math.inf, math.inf, math.inf)
-        return cls(float(finite.mean()), float(np.median(finite)), _percentile_95(errors), float(finite.max()))
-
-    def to_json(self) -> dict[str, float | None]:
-        """A JSON object; null means infinite."""
-        return {
-            name: value if math.isfinite(value) else None
-            for name, value in (("mean", self.mean), ("median", self.median), ("p95", self.p95), ("max", self.max))
-        }
+APART_NS, APART_TOLERANCE_NS = 1_000_000_000, 250_000_000
+"""RPE over a second: between keyframes whose times differ by a second, give or take half of a keyframe's slot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +36,10 @@ class Evaluation:
     """Errors of one trajectory against the truth.
 
     `frames` in the recording, `keyframes` that were to be registered, `registered` of those; `without_truth` keyframes
-    have no truth within 1 ms and count in no error. For the app, of every frame that has a pose and a truth,
-    interpolated ones included: `frame_index` (F,), `frame_rotation_deg` (F,), `frame_position_m` (F,).
+    have no truth within 1 ms and count in no error. `outliers`, `ate_m` and the relative errors `rpe_in_order` (from
+    each registered keyframe to the next) and `rpe_per_second` (to the one a second later) are over the registered
+    keyframes that have a truth. For the app, of every frame that has a pose and a truth, interpolated ones included:
+    `frame_index` (F,), `frame_rotation_deg` (F,), `frame_position_m` (F,).
     """
 
     frames: int
@@ -61,12 +48,21 @@ class Evaluation:
     without_truth: int
     rotation_deg: ErrorSummary
     position_m: ErrorSummary
+    outliers: Outliers
+    ate_m: AbsoluteError
+    rpe_in_order: RelativeError
+    rpe_per_second: RelativeError
     frame_index: Ints
     frame_rotation_deg: Floats
     frame_position_m: Floats
 
     def to_json(self) -> dict[str, Any]:
-        """What `gazeloc evaluate --json` prints of one recording and method."""
+        """What `gazeloc evaluate --json` prints of one recording and method: metres and degrees, null for infinite.
+
+        Keys are added, never renamed or removed. `rotation_deg`, `position_m`: see `ErrorSummary`. `outliers`: see
+        `Outliers`, of all compared `frames` those off by more than 2 m or 90°. `ate_m`: root mean squares of the
+        position, `unaligned` and after each alignment. `rpe`: `in_order` and `per_second`, see `RelativeError`.
+        """
         return {
             "frames": self.frames,
             "keyframes": self.keyframes,
@@ -74,6 +70,9 @@ class Evaluation:
             "without_truth": self.without_truth,
             "rotation_deg": self.rotation_deg.to_json(),
             "position_m": self.position_m.to_json(),
+            "outliers": self.outliers.to_json(),
+            "ate_m": self.ate_m.to_json(),
+            "rpe": {"in_order": self.rpe_in_order.to_json(), "per_second": self.rpe_per_second.to_json()},
         }
 
 
@@ -114,37 +113,37 @@ def evaluate(trajectory: Trajectory, truth_timestamp_ns: Ints, truth_poses: Rigi
             "recording's own, in seconds."
         )
     comparable = np.flatnonzero(trajectory.has_pose & (rows >= 0))
-    rotation_deg, position_m = np.zeros(0), np.zeros(0)
+    rotation_deg, position_m = np.full(len(trajectory), math.inf), np.full(len(trajectory), math.inf)
     if len(comparable):
-        rotation_deg, position_m = pose_errors(trajectory.poses(comparable), truth_poses[rows[comparable]])
+        found = pose_errors(trajectory.poses(comparable), truth_poses[rows[comparable]])
+        rotation_deg[comparable], position_m[comparable] = found
     localised = trajectory.is_localised
     counted = trajectory.is_keyframe & (rows >= 0)
-    summaries = []
-    for errors in (rotation_deg, position_m):
-        of_frame = np.full(len(trajectory), math.inf)
-        of_frame[comparable] = errors
-        of_frame[~localised] = math.inf
-        summaries.append(ErrorSummary.of(of_frame[counted]))
+    judged = np.flatnonzero(counted & localised)
+    ate_m, in_order, per_second = _path_errors(trajectory, judged, truth_poses[rows[judged]])
     return Evaluation(
         frames=len(trajectory),
         keyframes=int(trajectory.is_keyframe.sum()),
         registered=int((trajectory.is_keyframe & localised).sum()),
         without_truth=int((trajectory.is_keyframe & (rows < 0)).sum()),
-        rotation_deg=summaries[0],
-        position_m=summaries[1],
+        rotation_deg=ErrorSummary.of(np.where(localised, rotation_deg, math.inf)[counted]),
+        position_m=ErrorSummary.of(np.where(localised, position_m, math.inf)[counted]),
+        outliers=Outliers.of(position_m[judged], rotation_deg[judged]),
+        ate_m=ate_m,
+        rpe_in_order=in_order,
+        rpe_per_second=per_second,
         frame_index=frozen(comparable, np.int64),
-        frame_rotation_deg=frozen(rotation_deg),
-        frame_position_m=frozen(position_m),
+        frame_rotation_deg=frozen(rotation_deg[comparable]),
+        frame_position_m=frozen(position_m[comparable]),
     )
 
 
-def _percentile_95(errors: Floats) -> float:
-    """The 95th percentile with linear interpolation; infinite as soon as an infinite value takes part."""
-    ordered = np.sort(errors)
-    position = 0.95 * (len(ordered) - 1)
-    low, share = int(position), position - int(position)
-    if share == 0 or low + 1 == len(ordered):
-        return float(ordered[low])
-    if not np.isfinite(ordered[low + 1]):
-        return math.inf
-    return float((1 - share) * ordered[low] + share * ordered[low + 1])
+def _path_errors(
+    trajectory: Trajectory, judged: Ints, truth: RigidTransform
+) -> tuple[AbsoluteError, RelativeError, RelativeError]:
+    """ATE, and RPE in order and per second, of the frames `judged` (K,) against their true poses (K,)."""
+    poses = trajectory.poses(judged)
+    ate_m = AbsoluteError.of(np.asarray(poses.translation), np.asarray(truth.translation))
+    apart = pairs_apart(trajectory.timestamp_ns[judged], APART_NS, APART_TOLERANCE_NS)
+    in_order, per_second = (RelativeError.of(poses, truth, pairs) for pairs in (pairs_in_order(len(judged)), apart))
+    return ate_m, in_order, per_second

@@ -179,6 +179,9 @@ def evaluate(
 ) -> None:
     """Compare the estimated poses with the ground truth. Nothing is aligned to the truth first.
 
+    Mean, median and max are of the registered keyframes, percentiles of all, where those without a pose are infinitely
+    off. Outliers are off by more than 2 m or 90 degrees. Only the ATE "after" SE3 or Sim3 is aligned to the truth.
+
     Args:
         project: The project folder.
         truth: TUM lines of scan_from_camera with the recording's own timestamps; by default what the project names.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -17,6 +18,7 @@ from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.stages.recording import own_frames_of_model
 from gazeloc_core.stages.scan import check_tags_can_be_mapped
 from gazeloc_core.tags import FAMILIES
+from gazeloc_core.trajectory_errors import RelativeError
 from gazeloc_core.truth import read_tum
 
 
@@ -104,22 +106,30 @@ def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json
         value = {name: {method: e.to_json() for method, e in methods.items()} for name, methods in found.items()}
         print(json.dumps(value, indent=1, allow_nan=False))
         return
-    rows = [
-        [
-            name,
-            method,
-            str(e.frames),
-            str(e.keyframes),
-            str(e.registered),
-            *_cells(e.position_m, 100),
-            *_cells(e.rotation_deg),
-        ]
-        for name, methods in found.items()
-        for method, e in methods.items()
-    ]
+    each = [(name, method, e) for name, methods in found.items() for method, e in methods.items()]
     head = ["recording", "method", "frames", "keyframes", "registered"]
     head += [f"{what} {unit}" for unit in ("cm", "°") for what in ("mean", "median", "p95", "max")]
+    rows = [
+        [
+            *(name, method, str(e.frames), str(e.keyframes), str(e.registered)),
+            *_cells(e.position_m, ("mean", "median", "p95", "max"), 100),
+            *_cells(e.rotation_deg, ("mean", "median", "p95", "max")),
+        ]
+        for name, method, e in each
+    ]
     print(table(head, rows))
+    head = ["recording", "method", "outliers", "ATE cm", "after SE3", "after Sim3"]
+    head += [f"RPE{what} {unit}" for what in ("", "/s") for unit in ("cm", "°")]
+    rows = [
+        [
+            *(name, method, f"{e.outliers.count} of {e.outliers.frames}"),
+            *_cells(e.ate_m, ("unaligned", "se3_aligned", "sim3_aligned"), 100, "–"),
+            *_relative_cells(e.rpe_in_order),
+            *_relative_cells(e.rpe_per_second),
+        ]
+        for name, method, e in each
+    ]
+    print(f"\n{table(head, rows)}")
 
 
 def export(folder: Path, *, format: str, output: Path, recording: str | None, method: str | None) -> list[Path]:
@@ -133,9 +143,13 @@ def export(folder: Path, *, format: str, output: Path, recording: str | None, me
     return files
 
 
-def _cells(summary: object, factor: float = 1.0) -> Sequence[str]:
-    values = (getattr(summary, name) for name in ("mean", "median", "p95", "max"))
-    return [f"{value * factor:.2f}" if value is not None else "–" for value in values]
+def _cells(errors: object, names: Sequence[str], factor: float = 1.0, infinite: str = "inf") -> Sequence[str]:
+    values = (getattr(errors, name) for name in names)
+    return [f"{value * factor:.2f}" if math.isfinite(value) else infinite for value in values]
+
+
+def _relative_cells(errors: RelativeError) -> Sequence[str]:
+    return [*_cells(errors, ("position_rmse_m",), 100, "–"), *_cells(errors, ("rotation_rmse_deg",), 1, "–")]
 
 
 def _checked_tags(family: str | None, size_m: float | None) -> TagEntry | None:

@@ -121,8 +121,20 @@ def test_evaluate_is_one_json_object(capsys, home: Path):
     found = value["walk"]["sfm"]
     assert (found["frames"], found["keyframes"], found["registered"]) == (12, 2, 2)
     for name, limit in (("rotation_deg", 1e-3), ("position_m", 1e-4)):
-        assert set(found[name]) == {"mean", "median", "p95", "max"}
+        assert set(found[name]) == {"mean", "median", "p75", "p90", "p95", "max"}
         assert all(0 <= number < limit for number in found[name].values())
+
+
+def test_evaluate_prints_errors_and_then_errors_along_the_path(capsys, home: Path):
+    first, second = answer(capsys, "evaluate", home / "aligned").split("\n\n")
+    head, _, row = first.splitlines()
+    assert row.split()[:5] == ["walk", "sfm", "12", "2", "2"]
+    assert len(head.split()) == 5 + 2 * 8  # each of the eight statistics has its unit beside it
+    head, _, row = second.splitlines()
+    assert "ATE cm" in head
+    assert "after Sim3" in head
+    assert row.split()[2:5] == ["0", "of", "2"]
+    assert row.split()[5:] == ["0.00", "–", "–", "0.00", "0.00", "–", "–"]  # two poses tell nothing after an alignment
 
 
 def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):

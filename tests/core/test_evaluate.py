@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.evaluate import ErrorSummary, evaluate, match_times, pose_errors
+from gazeloc_core.evaluate import evaluate, match_times, pose_errors
 from gazeloc_core.trajectory import Trajectory
+from gazeloc_core.trajectory_errors import ErrorSummary
 
 TIMES = 1_700_000_000_000_000_000 + 33_333_333 * np.arange(20)
 
@@ -95,9 +96,13 @@ def test_p95_is_infinite_when_more_than_one_keyframe_in_twenty_failed():
 def test_json_is_strict_and_null_means_infinite():
     evaluation = evaluate(trajectory_of(["none"] * 20, range(20)), TIMES, camera_poses(20))
     value = json.loads(json.dumps(evaluation.to_json(), allow_nan=False))
-    assert set(value) == {"frames", "keyframes", "registered", "without_truth", "rotation_deg", "position_m"}
+    first_keys = ["frames", "keyframes", "registered", "without_truth", "rotation_deg", "position_m"]
+    assert list(value) == [*first_keys, "outliers", "ate_m", "rpe"]
     assert value["registered"] == 0
-    assert value["position_m"] == {"mean": None, "median": None, "p95": None, "max": None}
+    assert value["position_m"] == dict.fromkeys(["mean", "median", "p75", "p90", "p95", "max"])
+    assert value["outliers"] == {"frames": 0, "position": 0, "rotation": 0, "count": 0, "share": None}
+    assert value["ate_m"] == {"frames": 0, "unaligned": None, "se3_aligned": None, "sim3_aligned": None}
+    assert {pairs: errors["pairs"] for pairs, errors in value["rpe"].items()} == {"in_order": 0, "per_second": 0}
 
 
 def test_times_match_within_a_millisecond_and_to_the_nearest():
