@@ -1,7 +1,7 @@
 """How good camera poses become with how many keypoints: the paper's figure 8, over many random draws.
 
-The paper shows one set of 4 and one of 10 clicked keypoints. Here each draw chooses keypoints from a pool, moves them by
-a clicking error on both sides, aligns the reconstruction by the closed form alone and compares the cameras with the truth.
+The paper shows one set of 4 and one of 10 clicked keypoints. Here each draw chooses keypoints from a pool, moves them
+by a clicking error on both sides, aligns by the closed form alone and compares the cameras with the truth.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class KeypointCountOptions:
     draws: int = 200
     """Random sets of each number."""
     noise_m: float = 0.01
-    """Clicking error per axis on either side, normal, in metres of the scan; 0 where the pairs have their own errors."""
+    """Clicking error per axis on either side, in metres of the scan; 0 where the pairs have errors of their own."""
     far_apart: bool = True
     """Choose keypoints far from each other, as the paper's third rule demands; else any."""
     pool_share: float = 0.5
