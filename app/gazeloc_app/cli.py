@@ -1,4 +1,4 @@
-"""The command line: `gazeloc new | add | run | view | status | evaluate | export | demo`.
+"""The command line: `gazeloc new | add | run | view | status | evaluate | export | tags | demo`.
 
 Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
 code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
@@ -17,7 +17,7 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -209,6 +209,32 @@ def export(
 
 
 @deferred
+def tags(
+    action: Annotated[Literal["print"], tyro.conf.Positional],
+    *,
+    ids: str,
+    size: float,
+    output: Path,
+    family: str = "tag36h11",
+    paper: str = "a4",
+) -> None:
+    """Make a PDF of AprilTags to print, at true size, with cut marks and a ruler to check the printer.
+
+    Args:
+        action: What to do: print.
+        ids: Ids of the tags, e.g. 0-9 or 0-4,12.
+        size: Metres between the corners that the detector reports; the page says which edge that is.
+        output: The PDF file.
+        family: The tag family.
+        paper: The paper: a5, a4, a3, a2, letter or tabloid, upright.
+    """
+    from gazeloc_app import commands
+
+    actions = {"print": commands.print_tags}
+    actions[action](ids, family=family, size_m=size, paper=paper, output=output)
+
+
+@deferred
 def demo(*, port: int = 8080) -> None:
     """Open the app on the sample scene that GazeLoc brings along.
 
@@ -228,6 +254,7 @@ COMMANDS: dict[str, Any] = {
     "status": status,
     "evaluate": evaluate,
     "export": export,
+    "tags": tags,
     "demo": demo,
 }
 

@@ -16,6 +16,7 @@ from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, T
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.stages.recording import own_frames_of_model
 from gazeloc_core.stages.scan import check_tags_can_be_mapped
+from gazeloc_core.tag_sheet import SheetOptions, parse_ids, size_note, write_sheet
 from gazeloc_core.tags import FAMILIES
 from gazeloc_core.truth import read_tum
 
@@ -131,6 +132,14 @@ def export(folder: Path, *, format: str, output: Path, recording: str | None, me
         print(path)
     print("Exported frames show people: treat them as your recordings.")
     return files
+
+
+def print_tags(ids: str, *, family: str, size_m: float, paper: str, output: Path) -> None:
+    """Write the sheet and say what on it is as long as the tag size."""
+    options = SheetOptions(ids=parse_ids(ids), size_m=size_m, family=family, paper=paper)
+    pages = write_sheet(options, output)
+    print(f"{output}: {len(options.ids)} tags on {pages} pages of {paper}. {size_note(family, size_m)}")
+    print("Print at 100 % (actual size) and check the ruler on the page.")
 
 
 def _cells(summary: object, factor: float = 1.0) -> Sequence[str]:

@@ -24,6 +24,7 @@ OPTIONS = {
     "status": ["--json"],
     "evaluate": ["--truth", "--recording", "--json"],
     "export": ["--format", "--output"],
+    "tags": ["print", "--ids", "--size", "--output", "--family", "--paper"],
     "demo": ["--port"],
 }
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(CHECKOUT / "app"), str(CHECKOUT)])}
@@ -53,7 +54,7 @@ def test_help_names_every_command(capsys):
 def test_help_of_a_command_names_its_options(capsys, command: str):
     text = help_of(capsys, command)
     assert all(option in text for option in OPTIONS[command])
-    assert ("PROJECT" in text) == (command != "demo")
+    assert ("PROJECT" in text) == (command not in ("demo", "tags"))
 
 
 def test_help_draws_what_the_tag_size_is(capsys):
@@ -70,6 +71,14 @@ def test_help_draws_what_the_tag_size_is(capsys):
         "<---- size --->     . . . . . . . . .",
         "<- size -->",
     ]
+
+
+def test_tags_are_printed_with_what_their_size_is(capsys, tmp_path: Path):
+    words = ["--ids", "0-9", "--size", "0.08", "--output", tmp_path / "tags.pdf", "--family", "tagStandard41h12"]
+    for _ in range(2):  # its own file is replaced
+        said = answer(capsys, "tags", "print", *words)
+    assert "10 tags on 10 pages of a4. 80 mm is the inner edge" in said
+    assert (tmp_path / "tags.pdf").read_bytes().startswith(b"%PDF-")
 
 
 def test_version(capsys):

@@ -340,6 +340,14 @@ def _(home: Path) -> list[Any]:
     return ["evaluate", home / "aligned"]
 
 
+add("tags of no family", r"'tag36h10' is unknown", "tags print --ids 0 --size 0.1 --output @t.pdf --family tag36h10")
+add("a tag that is not there", "its ids are 0 to 586", "tags print --ids 500-600 --size 0.1 --output @t.pdf")
+add("ids that are none", "'0..3'; write them like", "tags print --ids 0..3 --size 0.1 --output @t.pdf")
+add("tags larger than the paper", "a4 takes 0.16 m at most", "tags print --ids 0 --size 0.2 --output @t.pdf")
+add("no such paper", "'a44' is unknown", "tags print --ids 0 --size 0.1 --output @t.pdf --paper a44")
+add("tags over another's file", "GazeLoc did not write it", "tags print --ids 0 --size 0.1 --output @truth.tum")
+
+
 def one_sentence(text: str) -> str:
     """The sentence at the end of what was written to standard error; all before it must be progress."""
     *progress, last = text.splitlines()

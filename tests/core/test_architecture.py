@@ -13,7 +13,7 @@ HOMES = {
     "pycolmap": {"camera", "sfm", "colmap_io", "colmap_format", "synthetic_model"},
     "open3d": {"raycast", "display_mesh", "synthesis"},
     "pyrender": {"render"},
-    "pyapriltags": {"tags"},
+    "pyapriltags": {"tags", "tag_bitmaps"},
     "trimesh": {"readers.mesh_file", "render"},
     "viser": set(),
     "evo": set(),
