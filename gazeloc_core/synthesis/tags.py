@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -19,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from gazeloc_core.arrays import Bytes, Floats, frozen
 from gazeloc_core.synthesis.geometry import Patch, quad
 from gazeloc_core.synthesis.textures import picture
+from gazeloc_core.tag_bitmaps import tag_bitmap
 
 FAMILY = "tag36h11"
 MODULES = 8
@@ -41,12 +41,10 @@ class PlacedTag:
 
 def tag_image(tag_id: int) -> Bytes:
     """A printed tag36h11 with its white margin, upright as the AprilTag library sees it, (N, N, 3) sRGB."""
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-    inner = cv2.aruco.generateImageMarker(dictionary, tag_id, MODULES * PIXELS_PER_MODULE)
-    inner = np.rot90(inner, 2)  # OpenCV draws this family upside down
+    ring = slice(1, 1 + MODULES)  # without the white cells around it
+    cells = tag_bitmap(FAMILY, tag_id).is_white[ring, ring].repeat(PIXELS_PER_MODULE, 0).repeat(PIXELS_PER_MODULE, 1)
     margin = int((PAPER_MODULES - MODULES) / 2 * PIXELS_PER_MODULE)
-    gray = np.pad(inner, margin, constant_values=255)
-    gray = np.where(gray > 127, 236, 22).astype(np.uint8)
+    gray = np.where(np.pad(cells, margin, constant_values=True), 236, 22).astype(np.uint8)
     return np.repeat(gray[..., None], 3, axis=2)
 
 
