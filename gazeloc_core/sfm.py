@@ -25,6 +25,8 @@ from gazeloc_core.errors import InputError, ReconstructionError
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.sfm_pairs import Pairs, choose_pairs
+from gazeloc_core.sfm_tags import corner_descriptors, corner_keypoints
+from gazeloc_core.tag_types import TagSightings
 
 _POLL_S = 0.2
 _LEAST_IMAGES = 3
@@ -64,11 +66,14 @@ def reconstruct(
     work_folder: Path,
     options: SfmOptions | None = None,
     report: Report = silent,
+    *,
+    sightings: TagSightings | None = None,
 ) -> list[SfmModel]:
     """Models of the pictures `names` in `image_folder`, all of one `camera`, the one with the most pictures first.
 
     `frame_indices` (K,) are the recording's frames of the names. `work_folder` receives the database and may be thrown
-    away afterwards; what an earlier run left there is overwritten.
+    away afterwards; what an earlier run left there is overwritten. `sightings` are tags in the same undistorted frames:
+    their corners are features too.
 
     Raises:
         InputError: if a picture is missing, or fewer than three are given.
@@ -82,6 +87,8 @@ def reconstruct(
     pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
     job = _Job(image_folder, tuple(names), camera, work_folder, options)
     job.extract(part(report, 0.0, 0.35))
+    if sightings is not None:
+        job.add_corners(sightings, frame_indices)
     pairs = choose_pairs(*job.descriptors(), options)
     job.match(pairs, part(report, 0.35, 0.7))
     models = job.map(part(report, 0.7, 0.9))
@@ -153,6 +160,23 @@ class _Job:
                 device=pycolmap.Device.cpu,
             )
             reader.existing_camera_id = 1  # the first call made it
+
+    def add_corners(self, sightings: TagSightings, frame_indices: Ints) -> None:
+        """The corners of tags as further features of the pictures of these frames, after SIFT's."""
+        database = pycolmap.Database.open(self.database)
+        try:
+            ids = {image.name: image.image_id for image in database.read_all_images()}
+            found = {i: (database.read_keypoints(i), database.read_descriptors(i)) for i in ids.values()}
+            database.clear_descriptors()
+            for name, frame in zip(self.names, np.asarray(frame_indices).tolist(), strict=True):
+                mine = sightings.frame_index == frame
+                keypoints, descriptors = found[ids[name]]
+                corners = np.vstack([keypoints, corner_keypoints(sightings.corners_px[mine])])
+                database.update_keypoints(ids[name], corners)
+                data = np.vstack([descriptors.data, corner_descriptors(sightings.tag_id[mine])])
+                database.write_descriptors(ids[name], pycolmap.FeatureDescriptors(descriptors.type, data))
+        finally:
+            database.close()
 
     def descriptors(self) -> tuple[list[Any], int]:
         """The SIFT descriptors of each picture in the order of `names`, (n, 128) uint8, and the seed."""

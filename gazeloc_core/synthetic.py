@@ -16,10 +16,12 @@ import json
 import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
 
+from gazeloc_core.files import read_json
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.synthesis import cloud, glasses, paths, phone, truth
 from gazeloc_core.synthesis.fusion import fused
@@ -226,6 +228,17 @@ def _write_recording(scene: Path, room: Room, route: RouteName, options: SceneOp
     truth.write_glasses(scene / truth_name(route), capture.timestamp_ns, capture.poses_at(capture.timestamp_ns))
     video = folder / cloud.video_name(capture, seed)
     glasses.write_video(video, room, capture, options.glasses_gain, options.video_crf, seed, report)
+
+
+def read_options(scene: Path) -> SceneOptions:
+    """The options that a scene folder was written with.
+
+    Raises:
+        InputError: if its `scene.json` is missing or is not JSON.
+    """
+    value: dict[str, Any] = read_json(scene / "scene.json", "the description of a scene")["options"]
+    named: Any = {k: tuple(v) if isinstance(v, list) else v for k, v in value.items()}
+    return SceneOptions(**named)
 
 
 def _write_description(folder: Path, options: SceneOptions) -> None:
