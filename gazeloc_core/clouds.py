@@ -1,7 +1,7 @@
 """Point clouds in Open3D: sampled surfaces, features, and the two registrations that need no tag.
 
-Open3D holds Python's GIL while it works and takes seconds to import, so that is left to the first caller. Given the same
-seed it gives the same answer, whatever the number of threads.
+Open3D holds Python's GIL while it works and takes seconds to import, so that is left to the first caller. The same
+seed gives the same answer to the last bit, whatever the number of threads.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ def _described(points: Floats, voxel: float) -> tuple[Any, Any]:
     near = o3d.geometry.KDTreeSearchParamHybrid
     cloud = _cloud(points).voxel_down_sample(voxel)
     cloud.estimate_normals(near(2 * voxel, NORMAL_NEIGHBOURS))
-    features = o3d.pipelines.registration.compute_fpfh_feature(cloud, near(5 * voxel, FEATURE_NEIGHBOURS))
-    return cloud, features
+    compute: Any = o3d.pipelines.registration.compute_fpfh_feature  # its stub demands an argument that it does not need
+    return cloud, compute(cloud, near(5 * voxel, FEATURE_NEIGHBOURS))
 
 
 def _registered(answer: Any) -> Registered | None:

@@ -118,7 +118,7 @@ def scan_tag_centers(scan: RoomScan, raycaster: Raycaster, sightings: TagSightin
     origins = np.zeros((len(sightings), 3))
     for row, (at, corners) in enumerate(zip(index.tolist(), sightings.corners_px, strict=True)):
         pose = frames[at].scan_from_camera
-        rays[row] = pose.rotation.as_matrix() @ frames[at].camera.unproject(tag_centre_px(corners))[0]
+        rays[row] = pose.rotation.as_matrix() @ _centre_ray(frames[at].camera, corners)
         origins[row] = pose.translation
     hits = raycaster.points(raycaster.cast(origins, rays))
     met = np.isfinite(hits).all(axis=1)
@@ -193,6 +193,12 @@ def _list(tags: TagCenters) -> str:
     return f"tags {', '.join(map(str, tags.tag_id.tolist()))}" if len(tags) else "none"
 
 
+def _centre_ray(camera: Camera, corners_px: Floats) -> Floats:
+    """The ray (3,) in the camera through a seen tag's centre: its diagonals are straight only without the lens."""
+    rays = camera.unproject(corners_px)
+    return np.append(tag_centre_px(rays[:, :2] / rays[:, 2:]), 1.0)
+
+
 def _points_under_tags(model: SfmModel, camera: Camera, sightings: TagSightings) -> dict[int, Ints]:
     """For each tag the rows of the points (n,) that were observed inside of its outline in any registered frame."""
     image_of = {int(frame): image for image, frame in enumerate(model.frame_indices) if frame >= 0}
@@ -227,9 +233,9 @@ def _largest_cluster(points: Floats, radius: float, neighbours: int) -> Bools:
     if len(points) == 0:
         return np.zeros(0, dtype=np.bool_)
     count = len(points)
-    distance, nearest = cKDTree(points).query(points, k=min(neighbours + 1, count), distance_upper_bound=radius)
-    distance, nearest = distance.reshape(count, -1), nearest.reshape(count, -1)  # one neighbour comes without a column
+    ranks = np.arange(1, min(neighbours + 1, count) + 1)  # the first is the point itself
+    distance, nearest = cKDTree(points).query(points, k=ranks, distance_upper_bound=radius)
     row, column = np.nonzero(np.isfinite(distance))
-    joined = coo_array((np.ones(len(row)), (row, nearest[row, column])), shape=(count, count))
+    joined = coo_array((np.ones(len(row)), (row, np.asarray(nearest)[row, column])), shape=(count, count))
     _, label = connected_components(joined, directed=False)
     return np.asarray(label == np.bincount(label).argmax(), dtype=np.bool_)

@@ -19,6 +19,9 @@ from gazeloc_core.errors import GeometryError
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
 
+_SIGHTS_AT_ONCE = 1000
+"""Lines of sight that are carved together; bounds the memory."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SurfacePointOptions:
@@ -31,7 +34,7 @@ class SurfacePointOptions:
     neighbours: int = 16
     """A point's spacing is its mean distance to this many nearest neighbours."""
     max_spacing: float = 4.0
-    """Points with more than this many times the median spacing are left out: they float in the air."""
+    """Points with more than this many times the median spacing are left out: they are alone, and mostly wrong."""
     least_points: int = 100
     """Fewer points than this make no surface."""
 
@@ -56,11 +59,11 @@ class DelaunayOptions:
     """Which points take part."""
     max_sights: int = 20_000
     """No more lines of sight than this carve, chosen evenly."""
-    steps: int = 100
+    steps: int = 200
     """A line of sight empties the tetrahedra at this many places along it."""
-    stop_spacings: float = 0.5
+    stop_spacings: float = 0.25
     """It stops this many times the median spacing before its point, which is known no better."""
-    max_edge_spacings: float = 6.0
+    max_edge_spacings: float = 4.0
     """Triangles with an edge longer than this many times the median spacing are dropped: they span gaps."""
 
 
@@ -124,10 +127,11 @@ def poisson_surface(model: SfmModel, options: PoissonOptions | None = None) -> M
     cloud.colors = o3d.utility.Vector3dVector(seen.colors / 255)
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(options.points.neighbours))
     cloud.normals = o3d.utility.Vector3dVector(towards_cameras(seen, np.asarray(cloud.normals)))
-    surface, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=options.depth)
+    # With one thread the same points give the same surface to the last bit; more threads gain little.
+    surface, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=options.depth, n_threads=1)
     vertices = np.asarray(surface.vertices, dtype=np.float64)
     far = cKDTree(seen.points).query(vertices)[0] > options.cut_spacings * seen.spacing
-    surface.remove_vertices_by_mask(far)
+    surface.remove_vertices_by_mask(np.asarray(far).tolist())
     if len(surface.triangles) == 0:
         raise GeometryError(f"Poisson's surface of {len(seen.points)} points runs near none of them; try Delaunay.")
     return Mesh(
@@ -183,8 +187,11 @@ def _empty(tetrahedra: Delaunay, seen: SightedPoints, options: DelaunayOptions) 
     length = np.linalg.norm(there - here, axis=1)
     end = np.maximum(1 - options.stop_spacings * seen.spacing / np.maximum(length, 1e-30), 0)
     is_empty = np.zeros(len(tetrahedra.simplices), dtype=np.bool_)
-    for share in np.linspace(0, 1, options.steps):
-        inside = tetrahedra.find_simplex(here + (share * end)[:, None] * (there - here))
+    shares = np.linspace(0, 1, options.steps)[:, None] * end
+    for start in range(0, len(chosen), _SIGHTS_AT_ONCE):  # one line after the other: SciPy walks on from the last place
+        some = slice(start, start + _SIGHTS_AT_ONCE)
+        places = here[some, None] + shares.T[some, :, None] * (there - here)[some, None]
+        inside = tetrahedra.find_simplex(places.reshape(-1, 3))
         is_empty[inside[inside >= 0]] = True
     return is_empty
 
@@ -207,5 +214,5 @@ def _spacings(points: Floats, neighbours: int) -> Floats:
     """(P,) the mean distance of each point to its nearest neighbours."""
     if len(points) < 2:
         return np.zeros(len(points))
-    count = min(neighbours + 1, len(points))
-    return np.asarray(cKDTree(points).query(points, k=count)[0][:, 1:].mean(axis=1), dtype=np.float64)
+    ranks = np.arange(2, min(neighbours + 1, len(points)) + 1)  # the first is the point itself
+    return np.asarray(np.mean(cKDTree(points).query(points, k=ranks)[0], axis=1), dtype=np.float64)

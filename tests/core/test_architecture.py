@@ -11,7 +11,7 @@ APP = sorted((CHECKOUT / "app" / "gazeloc_app").rglob("*.py"))
 
 HOMES = {
     "pycolmap": {"camera", "sfm", "colmap_io", "colmap_format", "synthetic_model", "synthesis"},
-    "open3d": {"raycast", "display_mesh", "synthesis"},
+    "open3d": {"raycast", "clouds", "surfaces", "display_mesh", "synthesis"},
     "pyrender": {"render"},
     "pyapriltags": {"tags", "tag_bitmaps"},
     "trimesh": {"readers.mesh_file", "render"},
