@@ -81,7 +81,7 @@ def new(
 
     Args:
         project: The project folder, new or empty.
-        scan: The room scan: a 3D Scanner App folder, or a mesh (PLY, OBJ, GLB).
+        scan: The room scan: a 3D Scanner App folder, an ARKitScenes video, or a mesh (PLY, OBJ, GLB).
         recording: The recording: a Pupil Cloud export, or a folder of images with a camera file.
         colmap: A COLMAP model of the recording's frames, used instead of our own reconstruction.
         colmap_times: CSV `name,timestamp_ns` that says which frame each image of that model is.
