@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Floats, Ints, frozen
 from gazeloc_core.errors import GeometryError
+from gazeloc_core.times import nearest_rows
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.trajectory_errors import (
     AbsoluteError,
@@ -85,17 +86,10 @@ def pose_errors(scan_from_camera: RigidTransform, truth: RigidTransform) -> tupl
 
 def match_times(timestamp_ns: Ints, truth_timestamp_ns: Ints) -> Ints:
     """(N,) the row of the truth nearest in time to each frame, -1 where none is within 1 ms."""
-    times, truth = (np.asarray(t, dtype=np.int64) for t in (timestamp_ns, truth_timestamp_ns))
-    if len(truth) == 0:
-        return np.full(len(times), -1, dtype=np.int64)
+    truth = np.asarray(truth_timestamp_ns, dtype=np.int64)
     order = np.argsort(truth, kind="stable")
-    after = np.clip(np.searchsorted(truth[order], times), 0, len(truth) - 1)
-    before = np.maximum(after - 1, 0)
-    candidates = order[np.stack([before, after])]
-    distance = np.abs(truth[candidates] - times)
-    nearest = distance.argmin(axis=0)
-    rows = candidates[nearest, np.arange(len(times))]
-    return np.where(distance.min(axis=0) <= MATCH_NS, rows, -1)
+    rows = nearest_rows(timestamp_ns, truth[order], MATCH_NS)
+    return np.where(rows >= 0, order[rows] if len(order) else -1, -1)
 
 
 def evaluate(trajectory: Trajectory, truth_timestamp_ns: Ints, truth_poses: RigidTransform) -> Evaluation:

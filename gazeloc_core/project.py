@@ -93,10 +93,7 @@ class Project:
         Raises:
             ProjectError: if the folder already holds a project or anything else.
         """
-        if (folder / "project.json").exists():
-            raise ProjectError(f"{folder}: there is a project already; add recordings with `gazeloc add`.")
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ProjectError(f"{folder}: the folder is not empty; name a new one for the project.")
+        check_new_folder(folder)
         for name in settings.recordings:
             _check_name(name)
         try:
@@ -297,6 +294,18 @@ class Project:
         if path is None:
             raise ValueError("a path that is null")
         return path
+
+
+def check_new_folder(folder: Path) -> None:
+    """Refuse a folder in which no new project can be made, because something is there.
+
+    Raises:
+        ProjectError: if it already holds a project or anything else.
+    """
+    if (folder / "project.json").exists():
+        raise ProjectError(f"{folder}: there is a project already; add recordings with `gazeloc add`.")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ProjectError(f"{folder}: the folder is not empty; name a new one for the project.")
 
 
 def _number(value: Any) -> float | None:

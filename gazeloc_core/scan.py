@@ -89,6 +89,8 @@ class ScanFrame:
     image_path: Path | None = None
     depth_path: Path | None = None
     confidence_path: Path | None = None
+    own_files: tuple[Path, ...] = ()
+    """Every file of the scan's folder that belongs to this frame alone."""
 
     def read_image(self) -> Bytes:
         """The frame's picture, (H, W, 3) RGB.

@@ -16,6 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.similarity_fit import solve_umeyama
+from gazeloc_core.times import nearest_rows
 from gazeloc_core.transforms import rotation_angle_rad
 
 OUTLIER_POSITION_M = 2.0
@@ -187,14 +188,9 @@ def pairs_apart(timestamp_ns: Ints, apart_ns: int, tolerance_ns: int) -> Ints:
     A start for which that moment lies after the last time has no partner.
     """
     times = np.asarray(timestamp_ns, dtype=np.int64)
-    if len(times) < 2:
-        return np.zeros((0, 2), dtype=np.int64)
-    wanted = times + apart_ns
-    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    before = after - 1
-    nearest = np.where(np.abs(times[before] - wanted) <= np.abs(times[after] - wanted), before, after)
-    near_enough = (np.abs(times[nearest] - wanted) <= tolerance_ns) & (wanted <= times[-1])
-    return np.stack([np.flatnonzero(near_enough), nearest[near_enough]], axis=1).astype(np.int64)
+    first = np.flatnonzero(times + apart_ns <= times.max(initial=0))
+    later = nearest_rows(times[first] + apart_ns, times, tolerance_ns)
+    return np.stack([first, later], axis=1)[later >= 0]
 
 
 def finite_or_none(value: float) -> float | None:

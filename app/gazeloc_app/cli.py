@@ -1,4 +1,4 @@
-"""The command line: `gazeloc new | add | run | view | status | evaluate | export | tags | demo`.
+"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | export | tags | demo`.
 
 Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
 code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
@@ -81,7 +81,7 @@ def new(
 
     Args:
         project: The project folder, new or empty.
-        scan: The room scan: a 3D Scanner App folder, or a mesh (PLY, OBJ, GLB).
+        scan: The room scan: a 3D Scanner App folder, an ARKitScenes video, or a mesh (PLY, OBJ, GLB).
         recording: The recording: a Pupil Cloud export, or a folder of images with a camera file.
         colmap: A COLMAP model of the recording's frames, used instead of our own reconstruction.
         colmap_times: CSV `name,timestamp_ns` that says which frame each image of that model is.
@@ -194,6 +194,37 @@ def evaluate(
 
 
 @deferred
+def protocol(
+    project: Project,
+    *,
+    scan: Path,
+    every: int = 2,
+    share: Annotated[float | None, tyro.conf.arg(metavar="SHARE")] = None,
+    seed: int = 0,
+    tag_family: OptionalName = None,
+    tag_size: TagSize = None,
+) -> None:
+    """Make a project that measures the methods on a scan alone: frames of the phone are held out as the recording.
+
+    Their poses are the truth; the scan in the project is without them. Then `gazeloc run` and `gazeloc evaluate`.
+
+    Args:
+        project: The project folder, new or empty.
+        scan: The room scan, one with posed frames: a 3D Scanner App folder or an ARKitScenes video.
+        every: Hold out the first of every so many frames that have a picture.
+        share: Hold out this share of them instead, between 0 and 1, chosen at random.
+        seed: Chooses the random frames.
+        tag_family: The family of the AprilTags in the room, e.g. tag36h11.
+        tag_size: Size of the tags in metres.
+    """
+    from gazeloc_app import commands
+
+    commands.protocol(
+        project, scan=scan, every=every, share=share, seed=seed, tag_family=tag_family, tag_size_m=tag_size
+    )
+
+
+@deferred
 def export(
     project: Project, *, format: str, output: Path, recording: OptionalName = None, method: OptionalName = None
 ) -> None:
@@ -256,6 +287,7 @@ COMMANDS: dict[str, Any] = {
     "view": view,
     "status": status,
     "evaluate": evaluate,
+    "protocol": protocol,
     "export": export,
     "tags": tags,
     "demo": demo,

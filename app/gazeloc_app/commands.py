@@ -14,6 +14,7 @@ from gazeloc_core import pipeline
 from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.methods import method_named
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.protocol import ProtocolOptions, make_protocol_project
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.stages.recording import own_frames_of_model
 from gazeloc_core.stages.scan import check_tags_can_be_mapped
@@ -131,6 +132,28 @@ def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json
         for name, method, e in each
     ]
     print(f"\n{table(head, rows)}")
+
+
+def protocol(
+    folder: Path,
+    *,
+    scan: Path,
+    every: int,
+    share: float | None,
+    seed: int,
+    tag_family: str | None,
+    tag_size_m: float | None,
+) -> Project:
+    """Hold frames out of a scan and make the project that registers them, and say which they are."""
+    tags = _checked_tags(tag_family, tag_size_m)
+    options = ProtocolOptions(every=every, share=share, seed=seed)
+    with progress_bar() as report:
+        project = make_protocol_project(folder, scan, tags=tags, options=options, report=report)
+    name, recording = next(iter(project.settings.recordings.items()))
+    print("\n".join(open_recording(recording.path).notes))
+    print(f"{folder}: a project with the recording {name!r}, frames held out of {scan}; its truth is their own poses.")
+    print(f"Next: gazeloc run {folder}; gazeloc evaluate {folder}")
+    return project
 
 
 def export(folder: Path, *, format: str, output: Path, recording: str | None, method: str | None) -> list[Path]:

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report, part, silent
-from gazeloc_core.readers import image_folder, mesh_file, pupil_cloud, scanner_app
+from gazeloc_core.readers import arkitscenes, image_folder, mesh_file, pupil_cloud, scanner_app
 from gazeloc_core.readers.depth_check import DepthAgreement, depth_agreement
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import RoomScan
@@ -42,6 +42,7 @@ Kind = TypeVar("Kind", ScanFormat, RecordingFormat)
 
 SCAN_FORMATS = (
     ScanFormat(scanner_app.FORMAT, "frame_*.json", scanner_app.recognise, scanner_app.read),
+    ScanFormat(arkitscenes.FORMAT, arkitscenes.TRAJECTORY, arkitscenes.recognise, arkitscenes.read),
     ScanFormat("bare mesh", "one PLY, OBJ, GLB or STL file", mesh_file.recognise, mesh_file.read),
 )
 RECORDING_FORMATS = (

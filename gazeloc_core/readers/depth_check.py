@@ -5,7 +5,7 @@ A wrong axis convention (a forgotten flip, an inverted pose) puts the two metres
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,3 +82,21 @@ def refuse_disagreement(scan: RoomScan, agreement: DepthAgreement) -> None:
             "the poses have a wrong axis convention or the mesh belongs to another scan; export all files again "
             "together",
         )
+
+
+def checked_against_depth(scan: RoomScan) -> RoomScan:
+    """The scan with a sentence on how its depth and its mesh agree.
+
+    Raises:
+        InputError: if they lie apart, or a depth or confidence picture does not decode.
+    """
+    agreement = depth_agreement(scan)
+    refuse_disagreement(scan, agreement)
+    if agreement.frames == 0:
+        note = "There is no lidar depth of high confidence: the poses could not be checked against the mesh."
+    else:
+        note = (
+            f"Lidar depth and mesh agree to {agreement.median_m * 1000:.1f} mm (median over {agreement.frames} "
+            f"frames, {agreement.share_hit:.0%} of the rays hit the mesh)."
+        )
+    return replace(scan, notes=(*scan.notes, note))

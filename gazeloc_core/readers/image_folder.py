@@ -9,13 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from gazeloc_core.arrays import Ints
 from gazeloc_core.camera import Camera
 from gazeloc_core.colmap_format import read_cameras_text
 from gazeloc_core.errors import InputError
 from gazeloc_core.frames import ImageFrames
+from gazeloc_core.readers.pictures import size_of
 from gazeloc_core.readers.pupil_files import read_gaze, read_scene_camera
 from gazeloc_core.recording import Recording
 from gazeloc_core.user_files import nanoseconds_of, natural_key, read_csv, read_json_object
@@ -46,9 +46,9 @@ def read(path: Path) -> Recording:
     camera_file = _camera_file(path)
     if not images or camera_file is None:
         raise InputError.of(path, "there are no images with a camera file", "add " + " or ".join(CAMERA_FILES))
-    camera = _read_camera(camera_file, _size_of(images[0]))
+    camera = _read_camera(camera_file, size_of(images[0]))
     for image in images:
-        if (size := _size_of(image)) != (camera.width, camera.height):
+        if (size := size_of(image)) != (camera.width, camera.height):
             problem = f"the picture is {size[0]}x{size[1]} but its camera {camera.width}x{camera.height}"
             raise InputError.of(image, problem, "remove it or give the camera file that belongs to these images")
     notes = []
@@ -84,15 +84,6 @@ def _read_camera(path: Path, size: tuple[int, int]) -> Camera:
     if len(cameras) != 1:
         raise InputError.of(path, f"it holds {len(cameras)} cameras, expected 1", "keep the camera of these images")
     return next(iter(cameras.values()))
-
-
-def _size_of(path: Path) -> tuple[int, int]:
-    """Width and height as stored, from the file's head; EXIF orientation is not applied."""
-    try:
-        with Image.open(path) as image:
-            return image.size
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError.of(path, "the picture does not decode", "export it again or remove it") from error
 
 
 def _in_order_of_time(path: Path, images: list[Path]) -> tuple[list[Path], Ints]:

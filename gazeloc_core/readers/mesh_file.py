@@ -48,7 +48,7 @@ def read(path: Path, unit: str | None, up_axis: str | None, report: Report) -> R
         notes.extend(missing_pictures(list(pictures_of(obj).values())))
         mesh = mesh_of(obj)
     else:
-        mesh = _through_trimesh(file)
+        mesh = mesh_through_trimesh(file)
     if file.suffix.lower() == ".glb":
         unit, up_axis = _as_standard(file, unit, "m", "unit"), _as_standard(file, up_axis, "y", "up axis")
     if unit is None or up_axis is None:
@@ -99,8 +99,12 @@ def _size_text(size: Floats) -> str:
     return " x ".join(f"{value:.3g}" for value in size)
 
 
-def _through_trimesh(path: Path) -> Mesh:
-    """The mesh of a PLY, STL or GLB; a GLB's nodes are placed by their transforms."""
+def mesh_through_trimesh(path: Path) -> Mesh:
+    """The mesh of a PLY, STL or GLB as written; a GLB's nodes are placed by their transforms.
+
+    Raises:
+        InputError: if the file is missing, does not parse or holds no triangles.
+    """
     import trimesh  # takes a second, and most scans are not read by it
 
     read_bytes(path)

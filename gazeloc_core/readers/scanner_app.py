@@ -8,19 +8,18 @@ the capture size, which the pictures may not have.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report
-from gazeloc_core.readers.depth_check import depth_agreement, refuse_disagreement
+from gazeloc_core.readers.depth_check import checked_against_depth
 from gazeloc_core.readers.mesh_file import missing_pictures
 from gazeloc_core.readers.obj_file import mesh_of, pictures_of, read_mtl, read_obj
+from gazeloc_core.readers.pictures import camera_at_size, size_of
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
 from gazeloc_core.transforms import rigid_from_matrix
 from gazeloc_core.user_files import about, numbers_of, read_json_object
@@ -54,16 +53,7 @@ def read(path: Path, unit: str | None, up_axis: str | None, report: Report) -> R
     mesh, mesh_notes = _read_mesh(path)
     scan = RoomScan(path, FORMAT, mesh, frames, "y", (*notes, *mesh_notes))
     report(0.7, "checking depth against the mesh")
-    agreement = depth_agreement(scan)
-    refuse_disagreement(scan, agreement)
-    if agreement.frames == 0:
-        note = "There is no lidar depth of high confidence: the poses could not be checked against the mesh."
-    else:
-        note = (
-            f"Lidar depth and mesh agree to {agreement.median_m * 1000:.1f} mm (median over {agreement.frames} "
-            f"frames, {agreement.share_hit:.0%} of the rays hit the mesh)."
-        )
-    return replace(scan, notes=(*scan.notes, note))
+    return checked_against_depth(scan)
 
 
 def _read_mesh(path: Path) -> tuple[Mesh, list[str]]:
@@ -109,21 +99,23 @@ def _read_frame(file: Path, assumed: list[str]) -> ScanFrame:
     picture = file.with_suffix(".jpg")
     number = file.stem.removeprefix("frame_")
     depth, confidence = file.with_name(f"depth_{number}.png"), file.with_name(f"conf_{number}.png")
+    own = [path for path in (file, picture, depth, confidence) if path.is_file()]
     return ScanFrame(
         name=file.stem,
         timestamp_ns=round(seconds * 1e9),
-        camera=_read_camera(file, value, picture if picture.is_file() else None, assumed),
+        camera=_read_camera(file, value, picture if picture in own else None, assumed),
         scan_from_camera=scan_from_camera,
-        image_path=picture if picture.is_file() else None,
-        depth_path=depth if depth.is_file() else None,
-        confidence_path=confidence if depth.is_file() and confidence.is_file() else None,
+        image_path=picture if picture in own else None,
+        depth_path=depth if depth in own else None,
+        confidence_path=confidence if depth in own and confidence in own else None,
+        own_files=tuple(own),
     )
 
 
 def _read_camera(file: Path, value: dict[str, Any], picture: Path | None, assumed: list[str]) -> Camera:
     """The frame's camera at the size of its picture, or of the capture where it has none."""
     matrix = numbers_of(file, value, "intrinsics", 9).reshape(3, 3)
-    size = _size_of(picture) if picture is not None else None
+    size = size_of(picture) if picture is not None else None
     if "projectionMatrix" in value:
         projection = numbers_of(file, value, "projectionMatrix", 16).reshape(4, 4)
         with np.errstate(divide="ignore", invalid="ignore"):  # fx = P[0, 0] * width / 2, as ARKit defines it
@@ -140,15 +132,4 @@ def _read_camera(file: Path, value: dict[str, Any], picture: Path | None, assume
         camera = Camera.from_opencv(width, height, matrix, [])
     if size is None:
         return camera
-    if abs(size[0] * height - size[1] * width) > 0.01 * size[0] * height:
-        problem = f"the picture is {size[0]}x{size[1]}, of another shape than its intrinsics' {width}x{height}"
-        raise InputError.of(file.with_suffix(".jpg"), problem, "export again, without cropping or turning pictures")
-    return camera.scaled(*size)
-
-
-def _size_of(picture: Path) -> tuple[int, int]:
-    try:
-        with Image.open(picture) as image:
-            return image.size
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError.of(picture, "the picture does not decode", "export it again or remove it") from error
+    return camera_at_size(camera, size, file.with_suffix(".jpg"))

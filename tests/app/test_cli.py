@@ -12,6 +12,7 @@ import pytest
 from data import CHECKOUT
 from fake_project import CLICKED, click, contents
 from gazeloc_app.cli import main
+from tiny_captures import write_scan
 
 from gazeloc_core import __version__
 from gazeloc_core.project import Project
@@ -23,6 +24,7 @@ OPTIONS = {
     "view": ["--port"],
     "status": ["--json"],
     "evaluate": ["--truth", "--recording", "--json"],
+    "protocol": ["--scan", "--every", "--share", "--seed", "--tag-family", "--tag-size"],
     "export": ["--format", "--output"],
     "tags": ["print", "--ids", "--size", "--output", "--family", "--paper"],
     "demo": ["--port"],
@@ -156,6 +158,18 @@ def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):
     words = ["evaluate", home / "aligned", "--truth", home / "shifted.tum", "--recording", "walk", "--json"]
     value = json.loads(answer(capsys, *words))
     assert value["walk"]["sfm"]["position_m"]["mean"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_protocol_makes_a_project_that_is_ready_to_run(capsys, home: Path):
+    write_scan(home / "long", frames=8)
+    said = answer(capsys, "protocol", home / "p", "--scan", home / "long", "--tag-family", "tag36h11")
+    assert "Recognised as image folder: it holds 4 images and camera.json" in said
+    assert f"Next: gazeloc run {home / 'p'}; gazeloc evaluate {home / 'p'}" in said
+    states = json.loads(answer(capsys, "status", home / "p", "--json"))["stages"]
+    assert {stage["state"] for stage in states} == {"missing"}
+    settings = Project.open(home / "p").settings
+    assert settings.tags is not None
+    assert settings.recordings["held-out"].truth == home / "p" / "held_out" / "truth.tum"
 
 
 @pytest.mark.parametrize(

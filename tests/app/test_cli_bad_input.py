@@ -206,6 +206,16 @@ add(
 add("recording of that name is there", r"'walk'; choose another with --name", "add @project --recording @walk")
 add("added recording missing", r"attic: there is no such", "add @project --recording @attic")
 
+# The paper's protocol.
+add("protocol: scan missing", r"attic: there is no such file", "protocol @fresh --scan @attic")
+add("protocol: a bare mesh", r"room\.obj: .* pass --unit", "protocol @fresh --scan @room.obj")
+add("protocol: too few frames", r"scan: of its 4 posed frames .* 2 would be held out", "protocol @fresh --scan @scan")
+add("protocol: every frame", r"Every 1 frames cannot be held out; hold", "protocol @fresh --scan @scan --every 1")
+add("protocol: more than all", r"share to hold out is 1\.5; it must", "protocol @fresh --scan @scan --share 1.5")
+add("protocol: word for a number", r"--every two: this is not a number", "protocol @fresh --scan @scan --every two")
+add("protocol: folder in use", r"walk: the folder is not empty; name", "protocol @walk --scan @scan")
+add("protocol: unknown family", r"--tag-family x: no such family", "protocol @fresh --scan @scan --tag-family x")
+
 # Running.
 add("unknown method", r"no method 'slam'; the methods are: sfm", "run @project --method slam")
 add("run: unknown recording", r"no recording 'run'; the project has walk", "run @project --recording run")

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 import trimesh
 from bad_input import Act, Table, change_json, check_refused, cut, into_folder, remove, write
+from tiny_arkitscenes import VIDEO, write_arkitscenes
 from tiny_captures import BOX_FACES, CORNERS, picture, write_scan
 
 from gazeloc_core.readers import open_scan
 
 table = Table()
 scan = table.damaged("scan", write_scan, open_scan)
+video = table.damaged("video", lambda path: write_arkitscenes(path, raw=True), open_scan)
 untextured = table.damaged("scan", lambda path: write_scan(path, textured=False), open_scan)
 
 
@@ -100,6 +102,41 @@ scan(
 untextured("picture cut off", r"frame_00002\.jpg: the picture does not decode", cut("frame_00002.jpg", 0.05))
 
 
+TRAJ, AT = "lowres_wide.traj", f"{VIDEO}_305.477"
+PINCAM, DEPTH, PLY = f"lowres_wide_intrinsics/{AT}.pincam", f"lowres_depth/{AT}.png", f"{VIDEO}_3dod_mesh.ply"
+video("trajectory cut off", r"lowres_wide\.traj: line 3 has \d values, expected 7", cut(TRAJ, 0.6))
+video("trajectory empty", r"lowres_wide\.traj: the file holds no poses", write(TRAJ, "\n"))
+video("trajectory of words", r"line 1 holds something that is not a number", write(TRAJ, "a b c d e f g"))
+video("trajectory with NaN", r"line 1 holds a value that is not finite", write(TRAJ, "305.377 0 0 nan 0 0 0"))
+video("trajectory runs back", r"line 2: the time 304 s does not rise", write(TRAJ, "305 0 0 0 0 0 0\n304 0 0 0 0 0 0"))
+video("trajectory is a picture", r"lowres_wide\.traj: the file is not UTF-8", write(TRAJ, b"\x89PNG\xff\xfe"))
+video("trajectory of another video", r"none of the 8 pictures .* 1 poses; download", write(TRAJ, "9.1 0 0 0 0 0 0"))
+video("intrinsics missing", rf"{AT}\.png: lowres_wide_intrinsics has no \.pincam", remove(PINCAM))
+video("intrinsics cut off", r"expected the six numbers .*, found '256 192'", write(PINCAM, "256 192"))
+video("intrinsics with focal length 0", r"\.pincam: .*focal length is \[0", write(PINCAM, "256 192 0 0 127 95"))
+video("intrinsics with NaN", r"\.pincam: .*finite", write(PINCAM, "256 192 nan 210 127 95"))
+video("intrinsics of size 0", r"\.pincam: The camera is 0x192 pixels", write(PINCAM, "0 192 210 210 127 95"))
+video("intrinsics of infinite size", r"\.pincam: the size infx192 is not finite", write(PINCAM, "inf 192 2 2 127 95"))
+video(
+    "intrinsics of another shape", r"the picture is 256x192, of another shape", write(PINCAM, "640 640 500 500 320 320")
+)
+video("picture cut off", rf"{AT}\.png: the picture does not decode", cut(f"lowres_wide/{AT}.png", 0.001))
+video("depth cut off", rf"{AT}\.png: not a depth picture", cut(DEPTH, 0.1))
+video("no mesh", r"there are 0 meshes \*_3dod_mesh\.ply, expected 1", remove(PLY))
+video("mesh cut off", rf"{PLY}: ", cut(PLY, 0.5))
+video("mesh of another room", r"lidar depth and mesh disagree", lambda p: shifted(p / PLY))
+
+
+def shifted(path: Path) -> None:
+    mesh = trimesh.load_mesh(path, process=False)
+    trimesh.Trimesh(np.add(mesh.vertices, (0.8, 0.5, 0.4)), mesh.faces).export(path)
+
+
+@table.case("video: a unit of its own", r"ARKitScenes is in metres with z up; leave the unit")
+def _(tmp_path: Path) -> Act:
+    return lambda: open_scan(write_arkitscenes(tmp_path), unit="mm")
+
+
 def obj(text: str) -> Callable[[Path], Any]:
     return lambda path: path.write_text(text)
 
@@ -151,7 +188,10 @@ def _(tmp_path: Path) -> Act:
     return lambda: open_scan(tmp_path / "no-such")
 
 
-@table.case("scan of an unknown kind", r"no known kind of scan: it holds a\.txt; looked for 3D Scanner App .*bare mesh")
+@table.case(
+    "scan of an unknown kind",
+    r"no known kind of scan: it holds a\.txt; looked for 3D Scanner App .*ARKitScenes .*bare mesh",
+)
 def _(tmp_path: Path) -> Act:
     (tmp_path / "a.txt").write_text("x")
     return lambda: open_scan(tmp_path)
