@@ -40,11 +40,11 @@ def localize_sfm(
     """
     options = options or LocalizeSfmOptions()
     times = np.asarray(timestamp_ns, dtype=np.int64)
-    is_keyframe = _mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
+    is_keyframe = frame_mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
     images = np.flatnonzero(model.frame_indices >= 0)
     images = images[np.argsort(model.frame_indices[images], kind="stable")]
     frames = model.frame_indices[images]
-    is_registered = _mask(frames, len(times), "images of the reconstruction")
+    is_registered = frame_mask(frames, len(times), "images of the reconstruction")
     status = np.full(len(times), PoseStatus.NONE.value, dtype="U16")
     if len(frames) == 0:
         return Trajectory.from_poses(times, status, is_keyframe, frames, None)
@@ -75,7 +75,12 @@ def within_gaps(at_ns: Ints, known_ns: Ints, max_gap_s: float) -> Bools:
     return np.asarray(inside & (exact | short), dtype=np.bool_)
 
 
-def _mask(indices: Ints, count: int, what: str) -> Bools:
+def frame_mask(indices: Ints, count: int, what: str) -> Bools:
+    """(N,) true at these frames of a recording with `count` frames.
+
+    Raises:
+        GeometryError: if a frame is not of the recording or named twice; `what` names them in the sentence.
+    """
     mask = np.zeros(count, dtype=np.bool_)
     if len(indices) and (indices.min() < 0 or indices.max() >= count):
         raise GeometryError(
