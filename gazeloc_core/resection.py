@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 
 from gazeloc_core.arrays import Bools, Floats, Ints
 
-_SCALES = (32.0, 8.0, 2.0, 1.0)
-_ROUNDS = 6
+_SCALES = (8.0, 2.0, 1.0)
+_ROUNDS = 10
 _NEAREST_M = 0.05
 _BEHIND_PX = 1e4
 
@@ -127,13 +127,17 @@ def distances_m(views: SeenSquares, poses: CameraPoses) -> Floats:
 
 def resect(views: SeenSquares, start: CameraPoses, errors: TagErrors) -> Resection:
     """The poses (P,) nearest to `start` that the views agree on."""
-    poses = start
-    for times in _SCALES:
-        damping = np.full(len(poses), 1e-3)
-        for _ in range(_ROUNDS):
-            weight = _weights(views, poses, errors, times)
-            poses, damping = _step(views, poses, weight, damping, errors)
-    normal, _ = _normal_equations(views, poses, _weights(views, poses, errors), errors)
+    poses = _descend(views, start, errors, _SCALES[0])
+    several = np.bincount(views.pose, minlength=len(poses)) > 1  # a pose's only view is its seed, whatever the scale
+    some, number = poses[several], np.cumsum(several) - 1
+    shared = views.pick(several[views.pose])
+    shared = replace(shared, pose=number[shared.pose])
+    for times in _SCALES[1:]:
+        some = _descend(shared, some, errors, times)
+    agreeing = shared.pick(shared.is_seed | errors.agrees(chi2_of(shared, some, errors)))
+    some = _descend(agreeing, some, errors, 1.0)  # the others still pulled a little
+    poses.centers[several], poses.rotations[several] = some.centers, some.rotations
+    normal, _ = normal_equations(views, poses, _weights(views, poses, errors), errors)
     covariance = np.asarray(np.linalg.inv(normal + 1e-9 * np.eye(6)), dtype=np.float64)
     return Resection(poses, covariance, chi2_of(views, poses, errors))
 
@@ -152,39 +156,42 @@ def whitened(values: Floats, views: SeenSquares, poses: CameraPoses, errors: Tag
     return np.asarray(own + mean / shared_px.reshape(-1, *[1] * (values.ndim - 1)))
 
 
+def normal_equations(
+    views: SeenSquares, poses: CameraPoses, weight: Floats, errors: TagErrors
+) -> tuple[Floats, Floats]:
+    """The matrix (P, 6, 6) and the gradient (P, 6) for shifts and turns, of views with `weight` (V,)."""
+    off = whitened(errors_px(views, poses), views, poses, errors).reshape(len(views), 8, 1)
+    jacobian = whitened(pose_jacobian(views, poses), views, poses, errors).reshape(len(views), 8, 6)
+    weighed = (weight[:, None, None] * jacobian).transpose(0, 2, 1)
+    normal, gradient = np.zeros((len(poses), 6, 6)), np.zeros((len(poses), 6))
+    np.add.at(normal, views.pose, weighed @ jacobian)
+    np.add.at(gradient, views.pose, (weighed @ off)[..., 0])
+    return normal, gradient
+
+
 def _weights(views: SeenSquares, poses: CameraPoses, errors: TagErrors, times: float = 1.0) -> Floats:
     return np.where(views.is_seed, 1.0, errors.weight(chi2_of(views, poses, errors), times))
 
 
-def _step(
-    views: SeenSquares, poses: CameraPoses, weight: Floats, damping: Floats, errors: TagErrors
-) -> tuple[CameraPoses, Floats]:
-    """The poses after one damped step, where it helps; elsewhere more damping for the next."""
-    normal, gradient = _normal_equations(views, poses, weight, errors)
-    diagonal = np.einsum("pii->pi", normal)
-    damped = normal + np.einsum("pi,ij->pij", damping[:, None] * diagonal + 1e-9, np.eye(6))
-    tried = poses.moved(-np.linalg.solve(damped, gradient[..., None])[..., 0])
-    before, after = (
-        np.bincount(views.pose, weight * chi2_of(views, p, errors), minlength=len(poses)) for p in (poses, tried)
-    )
-    better = after < before
-    chosen = CameraPoses(
-        np.where(better[:, None], tried.centers, poses.centers),
-        np.where(better[:, None, None], tried.rotations, poses.rotations),
-    )
-    return chosen, np.where(better, damping / 5, damping * 10)
-
-
-def _normal_equations(
-    views: SeenSquares, poses: CameraPoses, weight: Floats, errors: TagErrors
-) -> tuple[Floats, Floats]:
-    """The matrix (P, 6, 6) and the gradient (P, 6) for shifts and turns in the axes of the scan."""
-    off = whitened(errors_px(views, poses), views, poses, errors).reshape(len(views), 8)
-    jacobian = whitened(pose_jacobian(views, poses), views, poses, errors).reshape(len(views), 8, 6)
-    normal, gradient = np.zeros((len(poses), 6, 6)), np.zeros((len(poses), 6))
-    np.add.at(normal, views.pose, np.einsum("vri,v,vrj->vij", jacobian, weight, jacobian))
-    np.add.at(gradient, views.pose, np.einsum("vri,v,vr->vi", jacobian, weight, off))
-    return normal, gradient
+def _descend(views: SeenSquares, poses: CameraPoses, errors: TagErrors, times: float) -> CameraPoses:
+    """The poses after some damped steps, each taken where it helps."""
+    damping = np.full(len(poses), 1e-3)
+    for _ in range(_ROUNDS):
+        weight = _weights(views, poses, errors, times)
+        normal, gradient = normal_equations(views, poses, weight, errors)
+        diagonal = np.einsum("pii->pi", normal)
+        damped = normal + (damping[:, None] * diagonal + 1e-9)[:, None, :] * np.eye(6)
+        tried = poses.moved(-np.linalg.solve(damped, gradient[..., None])[..., 0])
+        before, after = (
+            np.bincount(views.pose, weight * chi2_of(views, p, errors), minlength=len(poses)) for p in (poses, tried)
+        )
+        better = after < before
+        poses = CameraPoses(
+            np.where(better[:, None], tried.centers, poses.centers),
+            np.where(better[:, None, None], tried.rotations, poses.rotations),
+        )
+        damping = np.where(better, damping / 5, damping * 10)
+    return poses
 
 
 def pose_jacobian(views: SeenSquares, poses: CameraPoses) -> Floats:
@@ -197,14 +204,14 @@ def pose_jacobian(views: SeenSquares, poses: CameraPoses) -> Floats:
     zero = np.zeros_like(z)
     by_local = np.stack([np.stack([1 / z, zero, -x / z**2], -1), np.stack([zero, 1 / z, -y / z**2], -1)], axis=-2)
     by_local = by_local * views.focal_px[:, None] * is_ahead[..., None, None]
-    by_place = np.einsum("vcai,vji->vcaj", by_local, poses.rotations[views.pose])
+    by_place = by_local @ poses.rotations[views.pose].transpose(0, 2, 1)[:, None]
     arm = views.corners - poses.centers[views.pose][:, None]
     return np.concatenate([-by_place, np.cross(by_place, arm[..., None, :])], axis=3)
 
 
 def _local(views: SeenSquares, poses: CameraPoses) -> tuple[Floats, Bools]:
     offset = views.corners - poses.centers[views.pose][:, None]
-    seen = np.einsum("vji,vcj->vci", poses.rotations[views.pose], offset)
+    seen = offset @ poses.rotations[views.pose]
     is_ahead = seen[..., 2] > _NEAREST_M
     return np.where(is_ahead[..., None], seen, 1.0), is_ahead
 

@@ -23,7 +23,16 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.arrays import Bools, Floats
-from gazeloc_core.resection import CameraPoses, SeenSquares, TagErrors, chi2_of, errors_px, pose_jacobian, whitened
+from gazeloc_core.resection import (
+    CameraPoses,
+    SeenSquares,
+    TagErrors,
+    chi2_of,
+    errors_px,
+    normal_equations,
+    pose_jacobian,
+    whitened,
+)
 
 _MOST_ROUNDS = 12
 _SETTLED_M = 1e-4
@@ -158,18 +167,19 @@ class _Problem:
 
     def _add_views(self, state: _State, diagonal: Floats, gradient: Floats) -> tuple[Floats, float, float]:
         """Add what the views say of the frames; the border (K, 12) of the edge shift, its corner and its slope."""
-        views, errors = self.shifted(state.edge_px), self.errors
-        error = whitened(errors_px(views, state.poses), views, state.poses, errors).reshape(-1, 8)
+        views, poses, errors = self.shifted(state.edge_px), state.poses, self.errors
+        error = whitened(errors_px(views, poses), views, poses, errors).reshape(-1, 8)
         weight = errors.weight(np.sum(error**2, axis=1))
-        by_pose = whitened(pose_jacobian(views, state.poses), views, state.poses, errors).reshape(-1, 8, 6)
-        by_edge = whitened(-self.chain.views.outward, views, state.poses, errors).reshape(-1, 8)
-        np.add.at(diagonal[:, :6, :6], views.pose, np.einsum("vri,v,vrj->vij", by_pose, weight, by_pose))
-        np.add.at(gradient[:, :6], views.pose, np.einsum("vri,v,vr->vi", by_pose, weight, error))
+        normal, slope = normal_equations(views, poses, weight, errors)
+        diagonal[:, :6, :6] += normal
+        gradient[:, :6] += slope
+        by_pose = whitened(pose_jacobian(views, poses), views, poses, errors).reshape(-1, 8, 6)
+        by_edge = weight[:, None] * whitened(-self.chain.views.outward, views, poses, errors).reshape(-1, 8)
         border = np.zeros((len(diagonal), _STATE))
-        np.add.at(border[:, :6], views.pose, np.einsum("vri,v,vr->vi", by_pose, weight, by_edge))
+        np.add.at(border[:, :6], views.pose, np.einsum("vri,vr->vi", by_pose, by_edge))
         prior = self.options.edge_shift_error_px**-2
-        corner = np.einsum("vr,v,vr->", by_edge, weight, by_edge) + prior
-        return border, float(corner), float(np.einsum("vr,v,vr->", by_edge, weight, error) + prior * state.edge_px)
+        corner = np.sum(by_edge**2 / weight[:, None]) + prior
+        return border, float(corner), float(np.sum(by_edge * error) + prior * state.edge_px)
 
 
 def _inverse_motion_covariance(step_s: Floats, change: Floats) -> Floats:
