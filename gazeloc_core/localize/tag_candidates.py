@@ -11,6 +11,7 @@ apart. The cost is minus the logarithm of a likelihood, 0 for a pose that explai
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,8 +149,8 @@ def _views_of(frame_of_sighting: Ints, frame: Ints) -> tuple[Ints, Ints]:
 def _distinct(every: Candidates) -> Ints:
     """The rows to keep: the cheapest of those that are the same pose, the best few of each frame."""
     kept: list[int] = []
-    starts = np.flatnonzero(np.diff(every.frame, prepend=-1))
-    for first, last in zip(starts, [*starts[1:], len(every)], strict=True):
+    starts = np.flatnonzero(np.diff(every.frame, prepend=-1)).tolist()
+    for first, last in itertools.pairwise([*starts, len(every)]):
         mine: list[int] = []
         for row in (first + np.argsort(every.cost[first:last], kind="stable")).tolist():
             hopeless = mine and every.cost[row] > every.cost[mine[0]] + _HOPELESS

@@ -64,7 +64,7 @@ def choose_path(candidates: Candidates, seconds: Floats, options: PathOptions) -
     """The choice for every frame that has candidates; `seconds` (N,) are the times of all frames of the recording."""
     frame, first = np.unique(candidates.frame, return_index=True)
     bounds = [*first.tolist(), len(candidates)]
-    gap = _gaps(candidates, seconds, bounds, options)
+    gap = _gaps(candidates, seconds, bounds, options) if len(candidates) else np.empty(0)
     chosen = np.full(len(frame), NO_CANDIDATE)
     is_open = np.zeros(len(frame), dtype=np.bool_)
     for k, (a, b) in enumerate(itertools.pairwise(bounds)):

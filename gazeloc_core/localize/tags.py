@@ -40,7 +40,7 @@ _LEAST_SIGHTINGS = 5
 class LocalizeTagsOptions:
     """What is assumed about detected tags and about heads (standard deviations), and when a frame is rejected."""
 
-    corner_error_px: float = 1.0
+    corner_error_px: float = 0.7
     """Detected corners, per axis. Errors of neighbouring frames are alike, so this is more than one frame's noise."""
     place_error_m: float = 0.01
     """Places of tags on the scan, per axis."""
