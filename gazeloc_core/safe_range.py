@@ -179,15 +179,16 @@ def least_safe_pixels(quality: TagQuality, tag_size_m: float, limits: SafeLimits
 
 
 def is_in_safe_range(quality: TagQuality, safe: Bools, pixels: Floats, angle_deg: Floats) -> Bools:
-    """Whether views (S,) lie in the `safe` cells (P, A): of the next lower number of pixels and the nearest angle.
+    """Whether views (S,) lie in the `safe` cells (P, A): the next lower number of pixels, and both angles around.
 
     NaN and views below the grid or beyond its angles do not; more pixels than the grid's largest count as those.
     """
     row = np.searchsorted(quality.pixels, np.nan_to_num(pixels), side="right") - 1
-    middles = (quality.angle_deg[1:] + quality.angle_deg[:-1]) / 2
-    column = np.searchsorted(middles, np.nan_to_num(angle_deg))
-    known = (row >= 0) & (angle_deg <= quality.angle_deg[-1])
-    return np.asarray(known & safe[np.maximum(row, 0), column])
+    upper = np.searchsorted(quality.angle_deg, angle_deg)  # NaN comes last
+    lower = np.searchsorted(quality.angle_deg, angle_deg, side="right") - 1
+    known = (row >= 0) & (lower >= 0) & (upper < len(quality.angle_deg))
+    row, lower, upper = (np.where(known, index, 0) for index in (row, lower, upper))
+    return np.asarray(known & safe[row, lower] & safe[row, upper])
 
 
 def _check(options: SafeRangeOptions) -> None:

@@ -29,7 +29,7 @@ from gazeloc_core.tags import TagDetector, TagOptions
 
 CAMERA = Camera.pinhole(1300, 1300, 766, 766, 650, 650)
 SIZE_M = 0.16
-SMALL = SafeRangeOptions(pixels=(14, 30, 90), angles_deg=(0, 45, 75), repeats=6)
+SMALL = SafeRangeOptions(pixels=(14, 30, 100), angles_deg=(0, 45, 70), repeats=6)
 
 
 @pytest.fixture(scope="module")
@@ -86,12 +86,13 @@ def test_darkness_is_as_dark_as_asked_for() -> None:
 
 def test_tags_are_lost_when_small_or_oblique_and_better_when_large(trials: TagTrials) -> None:
     quality = tag_quality(trials)
-    assert (quality.detection_rate[2] == 1).all()
+    assert (quality.detection_rate[2, :2] == 1).all()
+    assert quality.detection_rate[2, 2] > 0.8
     assert (quality.detection_rate[0] < 0.5).all()
     assert quality.detection_rate[1, 2] < quality.detection_rate[1, 1]
     assert quality.position_error_sizes[2, 1] < quality.position_error_sizes[1, 1]
-    assert quality.rotation_error_deg[2, 1] < 0.6
-    assert quality.position_error_sizes[2, 1] < 0.15
+    assert quality.rotation_error_deg[2, 1] < 0.8
+    assert quality.position_error_sizes[2, 1] < 0.2
 
 
 def test_a_tag_looked_at_straight_has_two_poses_that_cannot_be_told_apart(trials: TagTrials) -> None:
@@ -104,7 +105,7 @@ def test_a_tag_looked_at_straight_has_two_poses_that_cannot_be_told_apart(trials
 def test_the_same_options_give_the_same_numbers(trials: TagTrials) -> None:
     few = replace(SMALL, pixels=(14, 30))
     again = try_tags(few)
-    kept = trials.pixels < 90
+    kept = trials.pixels < 100
     for name in vars(again):
         np.testing.assert_array_equal(getattr(again, name), getattr(trials, name)[kept])
 
@@ -154,14 +155,13 @@ def test_the_safe_range_has_no_holes_and_scales_with_the_tag() -> None:
     assert np.isnan(least_safe_pixels(rare, 0.2)).tolist() == [False, True]
 
 
-def test_views_are_judged_by_the_next_lower_size_and_the_nearest_angle() -> None:
+def test_views_are_judged_by_the_next_lower_size_and_both_angles_around() -> None:
     quality = made_up([[9, 9], [0.1, 9], [0.1, 0.1]])
     safe = safe_cells(quality, 0.2)
-    pixels = np.array([39.9, 40, 79, 79, 80, 500, 10, np.nan, 80])
-    angles = np.array([0, 29, 31, 29, 31, 60, 0, 0, 61])
-    expected = [False, True, False, True, True, True, False, False, False]
+    pixels = np.array([39.9, 40, 79, 79, 80, 500, 10, np.nan, 80, 80])
+    angles = np.array([0, 0, 60, 1, 31, 60, 0, 0, 61, np.nan])
+    expected = [False, True, False, False, True, True, False, False, False, False]
     assert is_in_safe_range(quality, safe, pixels, angles).tolist() == expected
-    assert not is_in_safe_range(quality, safe, np.array([80.0]), np.array([np.nan])).any()
 
 
 def seen_tags(*pairs: tuple[int, int]) -> TagSightings:
