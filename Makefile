@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test setup fast format lint types bench scenes pictures clean
+.PHONY: demo test setup fast format lint types bench experiments scenes pictures clean
 
 demo: $(VENV)/.run
 	$(BIN)/gazeloc demo
@@ -33,6 +33,9 @@ pictures: $(VENV)/.dev  ## takes the README's pictures anew, from the demo's pro
 
 bench: $(VENV)/.dev  ## prints the numbers that the README quotes
 	$(BIN)/python tests/benchmarks
+
+experiments: $(VENV)/.dev  ## the paper's tables and figures into static/experiments: make experiments ONLY="table-2 figure-8"
+	$(BIN)/python -m gazeloc_core.experiments $(ONLY)
 
 scenes: $(VENV)/.dev  ## writes sample_scenes/ anew, the same for the same seed
 	$(BIN)/python -m gazeloc_core.synthetic sample_scenes/studio --preset studio

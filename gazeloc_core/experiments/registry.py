@@ -9,6 +9,8 @@ from gazeloc_core.experiments.finding import Finding
 from gazeloc_core.experiments.keypoint_table import figure_8
 from gazeloc_core.experiments.marker_points import figure_9
 from gazeloc_core.experiments.methods_table import table_2
+from gazeloc_core.experiments.reconstructions import figure_14
+from gazeloc_core.experiments.safe_tags import safe_range, tag_count
 from gazeloc_core.experiments.shape_table import table_1
 from gazeloc_core.experiments.shapes import figure_6
 from gazeloc_core.experiments.tag_solver import tag_solver
@@ -32,5 +34,8 @@ EXPERIMENTS: dict[str, Experiment] = {
     "figure-9": Experiment("Figure 9: points under the tags", figure_9),
     "table-1": Experiment("Table I: shape alone against keypoints", table_1),
     "table-2": Experiment("Table II: tags against reconstruction", table_2),
+    "figure-14": Experiment("Figure 14: reconstructions from phone and glasses", figure_14),
+    "safe-range": Experiment("Section IX: the safe range of a tag", safe_range),
+    "tag-count": Experiment("Section IX: the number of tags in the room", tag_count),
     "trajectories": Experiment("Figures 11 to 13: trajectories and renders", figures_11_to_13),
 }

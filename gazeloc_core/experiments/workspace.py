@@ -13,6 +13,7 @@ from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
+from gazeloc_core.protocol import make_protocol_project
 from gazeloc_core.resources import sample_scene
 from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.synthetic import PRESETS, write_scene
@@ -63,6 +64,13 @@ class Workspace:
         if self.project_folder is not None:
             return Project.open(self.project_folder)
         return self.project(self.presets[0], methods, report)
+
+    def protocol_project(self, scan: Path) -> Project:
+        """A scan with posed frames by the paper's protocol: frames held out of it play the glasses'."""
+        folder = self.cache / f"protocol-{scan.name}-{hash_of_value(str(scan.resolve()))[:10]}"
+        if (folder / "project.json").is_file():
+            return Project.open(folder)
+        return make_protocol_project(folder, scan)
 
     @property
     def presets(self) -> tuple[str, ...]:
