@@ -165,8 +165,9 @@ def _range_text(quality: TagQuality) -> str:
         for angle, pixels in zip(quality.angle_deg, least, strict=True)
     ]
     return (
-        f"A single tag of {100 * SIZE_M:.0f} cm is safe (found in 90 % of the pictures, its pose within 8 cm and 2° in "
-        f"the mean) from this many pixels on, by the angle between its normal and the line of sight: {', '.join(parts)}. "
-        "Seen straight, a tag's tilt is badly determined; seen from the side, it is. The last two maps say which size "
-        "is safe from how far, and how many tags of which size a room needs so that a wearer sees a safe one."
+        f"A single tag of {100 * SIZE_M:.0f} cm is safe (found in 90 % of the pictures, its pose within 8 cm and 2° in"
+        " the mean) from this many pixels on, by the angle between its normal and the line of sight: "
+        f"{', '.join(parts)}. Seen straight, a tag's tilt is badly determined; seen from the side it is well. The last "
+        "two maps say which size is safe from how far, and how many tags of which size a room needs so that a wearer "
+        "sees a safe one."
     )

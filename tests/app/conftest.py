@@ -18,7 +18,7 @@ def _template(tmp_path_factory) -> Path:
     shutil.copytree(project.folder, folder / "aligned")
     aligned = Project.open(folder / "aligned")
     click(aligned, CLICKED)
-    for stage in ("alignment", "trajectory", "gaze"):
+    for stage in ("alignment", "pieces", "trajectory", "gaze"):
         run_stage(aligned, stage_named(stage), "walk")
     write_scan(folder / "scan")
     write_image_folder(folder / "pictures")
