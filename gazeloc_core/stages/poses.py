@@ -32,10 +32,11 @@ def place_sfm(
 def sfm_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the poses of the method `sfm` depend on."""
     chosen = project.settings.chosen.get(recording)
+    in_force = chosen_alignment(project, recording).key if chosen is None else chosen.alignment
     return {
         **_model_inputs(project, recording),
         "pieces": project.artifact(recording, "pieces").header().content,
-        "alignment": chosen_alignment(project, recording).key if chosen is None else chosen.alignment,
+        "alignment": in_force,
     }
 
 

@@ -121,6 +121,7 @@ def test_status_is_one_json_object_and_changes_nothing(capsys, home: Path):
         ("reconstruction", "fresh"),
         ("alignment", "missing"),
         ("refinement", "missing"),
+        ("pieces", "missing"),
         ("trajectory", "missing"),
         ("gaze", "missing"),
     ]
