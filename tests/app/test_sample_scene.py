@@ -13,6 +13,9 @@ from data import SAMPLE_SCENES
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
 from gazeloc_core.camera import Camera
+from gazeloc_core.experiments.__main__ import Arguments
+from gazeloc_core.experiments.__main__ import run as run_experiments
+from gazeloc_core.experiments.registry import EXPERIMENTS
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.scene_project import scene_settings
@@ -118,6 +121,55 @@ def test_exports_agree_with_each_other(project: Project, tmp_path: Path):
     assert len(transforms["frames"]) == int(trajectory.is_registered.sum())
     with (tmp_path / "csv" / "poses.csv").open() as file:
         assert sum(1 for _ in file) == len(trajectory) + 1
+
+
+@pytest.fixture(scope="module")
+def all_methods(project: Project) -> Project:
+    """The same project after every other method too."""
+    for method in Method:
+        pipeline.run(project, method=method)
+    return project
+
+
+def test_every_method_is_measured_alike_and_ours_are_better_than_the_paper_s(all_methods: Project):
+    found = pipeline.evaluate_project(all_methods)["glasses"]
+    assert list(found) == list(Method)
+    assert found[Method.SFM].position_m.mean <= found[Method.SFM_PAPER].position_m.mean
+    assert found[Method.TAGS].position_m.mean < found[Method.TAGS_PAPER].position_m.mean
+    assert found[Method.TAGS].position_m.mean <= 0.08
+    assert found[Method.TAGS].rotation_deg.mean <= 2.0
+    assert {status.state for status in pipeline.statuses(all_methods)} == {State.FRESH}
+
+
+def test_tags_alone_give_no_pose_to_frames_without_a_tag(all_methods: Project):
+    sightings = inputs.load_sightings(all_methods.artifact("glasses", "tags").read_arrays())
+    for method in (Method.TAGS, Method.TAGS_PAPER):
+        trajectory = inputs.load_trajectory(all_methods.result("glasses", method, "trajectory").read_arrays())
+        assert not np.setdiff1d(np.flatnonzero(trajectory.has_pose), sightings.frame_index).size
+        assert trajectory.is_localised.sum() >= 0.9 * len(np.unique(sightings.frame_index))
+
+
+def test_each_method_is_exported_as_what_it_found(all_methods: Project, tmp_path: Path):
+    for method in Method:
+        pipeline.export(all_methods, format="tum", output=tmp_path / method, method=method)
+        times, _ = read_tum(tmp_path / method / "poses.tum")
+        trajectory = inputs.load_trajectory(all_methods.result("glasses", method, "trajectory").read_arrays())
+        assert times.tolist() == trajectory.timestamp_ns[trajectory.has_pose].tolist()
+
+
+def test_the_experiments_run_on_a_user_s_project(all_methods: Project, tmp_path: Path):
+    names = ("tag-solver", "figure-8", "figure-9", "table-2", "tag-count", "trajectories")
+    arguments = Arguments(
+        names=names, output=tmp_path / "out", cache=tmp_path / "cache", small=True, project=all_methods.folder
+    )
+    assert run_experiments(arguments) == 0
+    report = (tmp_path / "out" / "README.md").read_text()
+    for name in names:
+        assert EXPERIMENTS[name].title in report
+    with (tmp_path / "out" / "table-2-methods.csv").open() as file:
+        rows = {row["method"]: row for row in csv.DictReader(line for line in file if not line.startswith("#"))}
+    assert float(rows["sfm"]["position_cm"]) < 1.5
+    assert int(rows["tags"]["tag_frames_with_pose"]) >= 0.9 * int(rows["tags"]["tag_frames"])
 
 
 def test_the_scene_s_own_colmap_model_gives_the_same_job(tmp_path: Path):

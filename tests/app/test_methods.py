@@ -1,0 +1,123 @@
+"""Methods in the app: chosen per recording, saved, compared in the scene, in a table and in renders."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from app_project import make_app_project, true_poses
+from gazeloc_app import tasks
+from gazeloc_app.actions import ChooseMethod, CompareMethod, DrawTags, JobEnded, ShowFrame, StartJob, Undo
+from gazeloc_app.app import App
+from gazeloc_app.panels.methods import MethodPanel
+from gazeloc_app.state import Level
+
+from gazeloc_core.methods import Method
+from gazeloc_core.project import Project
+from gazeloc_core.stages import inputs
+from gazeloc_core.stages.poses import fresh_methods
+from gazeloc_core.trajectory import PoseStatus, Trajectory
+
+
+@pytest.fixture
+def project(tmp_path):
+    return make_app_project(tmp_path)
+
+
+@pytest.fixture
+def app(project):
+    app = App(project, port=0)
+    app.store._render()
+    yield app
+    app.jobs.stop()
+    app._render.close()
+    app.server.stop()
+    app._lock.release()
+
+
+def step(app, *actions):
+    for action in actions:
+        app.store.dispatch(action)
+    app.store.step()
+
+
+def panel(app) -> MethodPanel:
+    return next(view.__self__ for view in app.store._views if isinstance(getattr(view, "__self__", None), MethodPanel))
+
+
+def write_poses(project: Project, method: Method, off_m: float) -> None:
+    """What the method would have left: every second frame, off by a known distance."""
+    poses = true_poses()
+    count = len(poses)
+    is_seen = np.arange(count) % 2 == 0
+    centers = np.where(is_seen[:, None], np.add(poses.translation, (off_m, 0, 0)), np.nan)
+    wxyz = np.where(is_seen[:, None], poses.rotation.as_quat(scalar_first=True), np.nan)
+    times = inputs.load_recording(project, "walk").timestamp_ns
+    status = np.where(is_seen, PoseStatus.TAG_ONLY.value, PoseStatus.NONE.value)
+    trajectory = Trajectory(times, status, np.ones(count, bool), centers, wxyz)
+    project.result("walk", method, "trajectory").write_arrays(
+        inputs.trajectory_arrays(trajectory), options={}, inputs={"made": "up"}
+    )
+
+
+def test_a_method_is_chosen_saved_and_undone(app, project):
+    step(app, ChooseMethod(Method.TAGS))
+    assert Project.open(project.folder).method("walk") is Method.TAGS
+    step(app, Undo())
+    assert Project.open(project.folder).method("walk") is Method.SFM
+
+
+def test_the_chosen_method_is_red_and_others_have_their_own_colours(app, project):
+    nodes = app.server.scene._handle_from_node_name
+    write_poses(project, Method.TAGS, 0.05)
+    write_poses(project, Method.TAGS_PAPER, 0.30)
+    step(app, JobEnded(Level.INFO, "run"), ChooseMethod(Method.TAGS))
+    assert "/frusta/estimate" in nodes
+    assert "/frusta/methods/tags-paper" not in nodes
+    step(app, CompareMethod(Method.TAGS_PAPER, True))
+    assert "/frusta/methods/tags-paper" in nodes
+    step(app, ChooseMethod(Method.TAGS_PAPER))
+    assert "/frusta/methods/tags-paper" not in nodes, "the chosen one is red already"
+    step(app, CompareMethod(Method.TAGS_PAPER, False), ChooseMethod(Method.TAGS))
+    assert "/frusta/methods/tags-paper" not in nodes
+
+
+def test_the_table_says_frames_errors_and_how_far_methods_are_apart(app, project):
+    write_poses(project, Method.TAGS, 0.05)
+    write_poses(project, Method.TAGS_PAPER, 0.30)
+    step(app, JobEnded(Level.INFO, "run"), ChooseMethod(Method.TAGS))
+    table = panel(app)._table.content
+    for text in ("8 of 16", "5.0 cm", "30.0 cm", "25.0 cm", "0.00°", "not run"):
+        assert text in table
+
+
+def test_renders_of_compared_methods_stand_side_by_side_and_say_where_there_is_no_pose(app, project):
+    write_poses(project, Method.TAGS, 0.05)
+    write_poses(project, Method.TAGS_PAPER, 0.30)
+    step(app, JobEnded(Level.INFO, "run"), ChooseMethod(Method.TAGS), CompareMethod(Method.TAGS_PAPER, True))
+    step(app, ShowFrame(2))
+    assert panel(app)._renders.content.count("<img") == 2
+    step(app, ShowFrame(3))
+    assert panel(app)._renders.content.count("<img") == 0
+    assert panel(app)._renders.content.count("no pose") == 2
+
+
+def test_a_method_that_cannot_run_is_a_sentence(app, project):
+    keywords = (("recording", "walk"), ("method", Method.SFM_PAPER))
+    step(app, StartJob("Run sfm-paper", tasks.run_all, keywords))
+    end = time.monotonic() + 90
+    while app.store.state.job is not None:
+        assert time.monotonic() < end, "the job did not end"
+        time.sleep(0.05)
+        app.store.step()
+    assert app.store.state.notice.level is Level.ERROR
+    assert "three tags on both sides" in app.store.state.notice.text
+    assert Method.SFM_PAPER not in fresh_methods(project, "walk")
+
+
+def test_drawing_tags_changes_the_frames_url_only(app):
+    before = app.store.state
+    step(app, DrawTags(True))
+    assert app.store.state.draws_tags
+    assert app.store.state.annotation == before.annotation
