@@ -174,8 +174,10 @@ def reconstruct_keyframes(
 
 def reconstruction_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the reconstruction depends on."""
-    undistorted = project.artifact(recording, "undistorted").header().content
-    return {"undistorted": undistorted} | keyframe_inputs(project, recording)
+    values = {"undistorted": project.artifact(recording, "undistorted").header().content}
+    if project.settings.tags is not None:
+        values["tags"] = project.artifact(recording, "tags").header().content
+    return values | keyframe_inputs(project, recording)
 
 
 def _import_model(project: Project, recording: str) -> list[SfmModel]:
@@ -190,6 +192,7 @@ def _import_model(project: Project, recording: str) -> list[SfmModel]:
 
 def _reconstruct(project: Project, recording: str, options: SfmOptions, work: Path, report: Report) -> list[SfmModel]:
     keyframes = load_keyframes(project, recording)
+    has_tags = project.settings.tags is not None
     return reconstruct(
         project.artifact(recording, "undistorted").folder / "images",
         [image_name(index) for index in keyframes.tolist()],
@@ -198,6 +201,7 @@ def _reconstruct(project: Project, recording: str, options: SfmOptions, work: Pa
         work,
         options,
         report,
+        sightings=inputs.load_sightings(project.artifact(recording, "tags").read_arrays()) if has_tags else None,
     )
 
 
