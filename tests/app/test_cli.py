@@ -12,6 +12,7 @@ import pytest
 from data import CHECKOUT
 from fake_project import CLICKED, click, contents
 from gazeloc_app.cli import main
+from tiny_arkitscenes import write_arkitscenes
 from tiny_captures import write_scan
 
 from gazeloc_core import __version__
@@ -159,6 +160,14 @@ def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):
     words = ["evaluate", home / "aligned", "--truth", home / "shifted.tum", "--recording", "walk", "--json"]
     value = json.loads(answer(capsys, *words))
     assert value["walk"]["sfm"]["position_m"]["mean"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_an_arkitscenes_video_can_be_the_scan(capsys, home: Path):
+    write_arkitscenes(home / "video")
+    said = answer(capsys, "new", home / "p", "--scan", home / "video", "--recording", home / "walk")
+    assert "Recognised as ARKitScenes: it holds" in said
+    assert "4 of the 8 pictures in lowres_wide have a pose" in said
+    assert Project.open(home / "p").settings.scan.path == home / "video"
 
 
 def test_protocol_makes_a_project_that_is_ready_to_run(capsys, home: Path):
