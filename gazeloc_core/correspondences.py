@@ -91,7 +91,7 @@ def gather(
     """The pairs of all tags that both sides know, by id, and of all clicked keypoints that count.
 
     A tag whose sightings by the phone disagree is expected to be off by as much, beside `tag_sigma_m`; so is a keypoint
-    that was triangulated from clicks in frames, beside `clicked_sigma_m`.
+    of which one side or both were triangulated from clicks in frames, beside `clicked_sigma_m`.
     """
     names: list[str] = []
     groups: list[str] = []
@@ -111,7 +111,10 @@ def gather(
     counting = [pair for pair in keypoints if pair.counts]
     sfm_side, scan_side = np.concatenate([*sfm, clicked_sfm]), np.concatenate([*scan, clicked_scan])
     scale = rough_scale(sfm_side, scan_side)
-    sigmas += [float(np.hypot(clicked_sigma_m, scale * (pair.sfm_sigma or 0.0))) for pair in counting]
+    sigmas += [
+        float(np.linalg.norm([clicked_sigma_m, pair.scan_sigma or 0.0, scale * (pair.sfm_sigma or 0.0)]))
+        for pair in counting
+    ]
     return Correspondences(
         (*names, *clicked), (*groups, *(pair.key for pair in counting)), sfm_side, scan_side, np.array(sigmas)
     )

@@ -20,19 +20,28 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Sighting:
-    """A click in a frame of the recording: pixel (x, y) in the *undistorted* frame, first pixel centre at 0.5."""
+    """A click in a frame: pixel (x, y), first pixel centre at 0.5.
+
+    Of the recording it is the *undistorted* frame, by its index; of the scan one of `frames_with_images`, as stored.
+    """
 
     frame_index: int
     x_px: float
     y_px: float
 
 
+def add_sighting(sightings: tuple[Sighting, ...], sighting: Sighting) -> tuple[Sighting, ...]:
+    """The sightings with one more; an earlier one in the same frame gives way."""
+    return (*(s for s in sightings if s.frame_index != sighting.frame_index), sighting)
+
+
 @dataclass(frozen=True)
 class KeypointPair:
     """One clicked keypoint: `scan` in metres on the scan, `sfm` in the reconstruction's units, either may be missing.
 
-    `sightings` are the clicks in frames from which `sfm` was triangulated; empty where it was clicked in the cloud.
-    `sfm_sigma` is then the standard deviation of `sfm`, in the reconstruction's units: far points are known worse.
+    `sightings` are the clicks in the recording's frames from which `sfm` was triangulated; empty where it was clicked
+    in the cloud. `sfm_sigma` is then the standard deviation of `sfm`, in the reconstruction's units: far points are
+    known worse. `scan_sightings` and `scan_sigma` (in metres) are the same of `scan`, from the phone's frames.
     """
 
     key: str
@@ -42,6 +51,8 @@ class KeypointPair:
     sightings: tuple[Sighting, ...] = ()
     sfm_sigma: float | None = None
     enabled: bool = True
+    scan_sightings: tuple[Sighting, ...] = ()
+    scan_sigma: float | None = None
 
     @property
     def is_complete(self) -> bool:
@@ -52,10 +63,6 @@ class KeypointPair:
     def counts(self) -> bool:
         """Whether the pair takes part in an alignment."""
         return self.is_complete and self.enabled
-
-    def with_sighting(self, sighting: Sighting) -> tuple[Sighting, ...]:
-        """The sightings with one more; an earlier one in the same frame gives way."""
-        return (*(s for s in self.sightings if s.frame_index != sighting.frame_index), sighting)
 
 
 @dataclass(frozen=True)
@@ -121,12 +128,20 @@ def _pair_from_json(value: dict[str, Any]) -> KeypointPair:
         name=str(value["name"]),
         scan=_point_from_json(value["scan"]),
         sfm=_point_from_json(value["sfm"]),
-        sightings=tuple(
-            Sighting(int(s["frame_index"]), float(s["x_px"]), float(s["y_px"])) for s in value["sightings"]
-        ),
-        sfm_sigma=None if value.get("sfm_sigma") is None else float(value["sfm_sigma"]),
+        sightings=_sightings_from_json(value["sightings"]),
+        sfm_sigma=_number_from_json(value.get("sfm_sigma")),
         enabled=bool(value["enabled"]),
+        scan_sightings=_sightings_from_json(value.get("scan_sightings", ())),  # files of earlier versions have none
+        scan_sigma=_number_from_json(value.get("scan_sigma")),
     )
+
+
+def _sightings_from_json(values: Any) -> tuple[Sighting, ...]:
+    return tuple(Sighting(int(s["frame_index"]), float(s["x_px"]), float(s["y_px"])) for s in values)
+
+
+def _number_from_json(value: Any) -> float | None:
+    return None if value is None else float(value)
 
 
 def _point_from_json(value: Any) -> Point | None:

@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Any, Protocol
 
 from gazeloc_app.state import Annotation, AppState, Job, Layer, Level
-from gazeloc_core.keypoints import KeypointPair, Point, Sighting
+from gazeloc_core.keypoints import KeypointPair, Point, Sighting, add_sighting
 from gazeloc_core.methods import Method
 
 
@@ -31,6 +31,20 @@ class Side(StrEnum):
     SCAN = "scan"
     SFM = "sfm"
 
+    def sightings_of(self, pair: KeypointPair) -> tuple[Sighting, ...]:
+        """The pair's clicks in frames on this side."""
+        return pair.scan_sightings if self is Side.SCAN else pair.sightings
+
+    def point_of(self, pair: KeypointPair) -> Point | None:
+        """The pair's point on this side."""
+        return pair.scan if self is Side.SCAN else pair.sfm
+
+    def fields(self, point: Point | None, sightings: tuple[Sighting, ...], sigma: float | None) -> dict[str, Any]:
+        """This side of a pair as `KeypointSet.change` takes it."""
+        if self is Side.SCAN:
+            return {"scan": point, "scan_sightings": sightings, "scan_sigma": sigma}
+        return {"sfm": point, "sightings": sightings, "sfm_sigma": sigma}
+
 
 @dataclass(frozen=True)
 class PickPoint:
@@ -42,19 +56,16 @@ class PickPoint:
     side: Side
     point: Point
     move: bool = False
-    sightings: tuple[Sighting, ...] = ()
 
     def apply(self, state: AppState) -> AppState:
         """The state with the point placed and its pair selected."""
         keypoints = state.annotation.keypoints
         selected = keypoints.get(state.selected_key) if state.selected_key else None
-        fields = {self.side.value: self.point}
-        if self.side is Side.SFM:
-            fields |= {"sightings": self.sightings, "sfm_sigma": None}  # type: ignore[dict-item]
-        if selected is not None and (self.move or getattr(selected, self.side) is None):
+        fields = self.side.fields(self.point, (), None)
+        if selected is not None and (self.move or self.side.point_of(selected) is None):
             return state.with_keypoints(keypoints.change(selected.key, **fields))
         key = keypoints.next_key()
-        pair = KeypointPair(key, f"Keypoint {key[1:]}", **fields)  # type: ignore[arg-type]
+        pair = KeypointPair(key, f"Keypoint {key[1:]}", **fields)
         return replace(state.with_keypoints(keypoints.add(pair)), selected_key=key)
 
 
@@ -62,27 +73,27 @@ class PickPoint:
 class PickSighting:
     """A click in a frame, kept with the pair `key` (None: a new pair); a second one in a frame replaces the first.
 
-    `sfm` is what all of the pair's sightings triangulate to, with its standard deviation; None while there are fewer
-    than two.
+    `side` says whose frames they are: the recording's or the phone's. `point` is what all of the pair's sightings on
+    that side triangulate to, with its standard deviation; None while there are fewer than two.
     """
 
     sighting: Sighting
     key: str | None = None
-    sfm: Point | None = None
-    sfm_sigma: float | None = None
+    point: Point | None = None
+    sigma: float | None = None
+    side: Side = Side.SFM
 
     def apply(self, state: AppState) -> AppState:
-        """The state with the sighting and, where it is known, the pair's sfm side."""
+        """The state with the sighting and, where it is known, the pair's point on that side."""
         keypoints = state.annotation.keypoints
         pair = keypoints.get(self.key) if self.key else None
         if pair is None:
             key = keypoints.next_key()
-            pair = KeypointPair(key, f"Keypoint {key[1:]}", sightings=(self.sighting,))
+            fields = self.side.fields(None, (self.sighting,), None)
+            pair = KeypointPair(key, f"Keypoint {key[1:]}", **fields)
             return replace(state.with_keypoints(keypoints.add(pair)), selected_key=key)
-        sightings = pair.with_sighting(self.sighting)
-        return state.with_keypoints(
-            keypoints.change(pair.key, sightings=sightings, sfm=self.sfm, sfm_sigma=self.sfm_sigma)
-        )
+        sightings = add_sighting(self.side.sightings_of(pair), self.sighting)
+        return state.with_keypoints(keypoints.change(pair.key, **self.side.fields(self.point, sightings, self.sigma)))
 
 
 @dataclass(frozen=True)

@@ -5,24 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import viser
+from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app import picking, widgets
 from gazeloc_app.actions import Action, Notify, PickPoint, PickSighting, ShowFrame, Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import Frame
+from gazeloc_app.render_worker import Frame, Photo, camera_text
 from gazeloc_app.scene.frames import PLANE_M, FrameInSceneLayer, look_through
 from gazeloc_app.scene_view import SceneView, when_picture
 from gazeloc_app.sightings import frame_pose, triangulated
-from gazeloc_app.state import AppState, Level
+from gazeloc_app.state import AppState, Layer, Level
 from gazeloc_core.arrays import Floats
+from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GazelocError
-from gazeloc_core.keypoints import Point, Sighting
+from gazeloc_core.keypoints import Point, Sighting, add_sighting
 
 DEBOUNCE_S = 0.15
 SAME_SPOT_RAD = 0.002
@@ -36,6 +38,18 @@ class PickMode(StrEnum):
     SCAN = "sets a point on the scan"
     SFM = "sets a point in the reconstruction"
     FRAME = "sets a point in the frame"
+
+
+class _Looked(NamedTuple):
+    """The frame that is looked through: of a recording, or (`recording` None) of the scan's `frames_with_images`."""
+
+    recording: str | None
+    frame: int
+
+    @property
+    def side(self) -> Side:
+        """Which side of a keypoint a click in it sets."""
+        return Side.SCAN if self.recording is None else Side.SFM
 
 
 class Browser:
@@ -54,7 +68,7 @@ class Browser:
         self._state, self._dispatch = state, dispatch
         self._last_click = (0.0, np.zeros(3))
         self._picture = FrameInSceneLayer(client.scene)
-        self._looking_at: tuple[str, int] | None = None
+        self._looking_at: _Looked | None = None
         gui = client.gui
         self._mode: Any = gui.add_dropdown(
             "A click", tuple(PickMode), hint="In this browser only. Dragging always orbits. The key P goes on."
@@ -105,7 +119,16 @@ class Browser:
             text = f"Frame {frame} is not in the reconstruction, so there is nothing to look through; try a keyframe."
             self._dispatch(Notify(Level.WARNING, text))
             return
-        target = (state.recording, frame)
+        job = Frame(recording=state.recording, index=frame)
+        self._look_from(_Looked(state.recording, frame), pose, camera, job)
+
+    def look_with_phone(self, frame: int) -> None:
+        """Put this browser's camera where the phone's was, with the picture of `scan.frames_with_images[frame]`."""
+        photo = self._data.scan().frames_with_images[frame]
+        job = Photo(path=str(photo.image_path), camera=camera_text(photo.camera))
+        self._look_from(_Looked(None, frame), photo.scan_from_camera, photo.camera, job)
+
+    def _look_from(self, target: _Looked, pose: RigidTransform, camera: Camera, job: Frame | Photo) -> None:
         self._looking_at = target
         width, height = int(self._client.camera.image_width), int(self._client.camera.image_height)
         view = look_through(pose, camera, width / max(height, 1))
@@ -119,9 +142,7 @@ class Browser:
             if self._looking_at == target:
                 self._picture.show(pose, camera, image)
 
-        future = self._render.submit(
-            Frame(recording=state.recording, index=frame), key=f"look {self._client.client_id}"
-        )
+        future = self._render.submit(job, key=f"look {self._client.client_id}")
         future.add_done_callback(when_picture(paste))
 
     def leave_frame(self) -> None:
@@ -131,8 +152,9 @@ class Browser:
         widgets.set_property(self._leave, "visible", False)
 
     def render(self, state: AppState) -> None:
-        """Follow the frame slider while looking through a camera."""
-        if self._looking_at is not None and self._looking_at != (state.recording, state.frame):
+        """Follow the frame slider while looking through a camera of the recording."""
+        at = self._looking_at
+        if at is not None and at.side is Side.SFM and at != _Looked(state.recording, state.frame):
             self.look(state.frame)
 
     def _next_mode(self) -> None:
@@ -164,9 +186,13 @@ class Browser:
     def _pick_in_frame(self, origin: Floats, direction: Floats) -> Action:
         state = self._state()
         if self._looking_at is None:
-            return Notify(Level.INFO, "Look through a camera first (button in the panel “Frame”), then click in it.")
-        recording, frame = self._looking_at
-        pose, camera = frame_pose(self._data, state, frame), self._data.camera(recording)
+            return Notify(
+                Level.INFO,
+                "Look through a camera first (button in the panel “Frame”, or click a blue one of the phone while a "
+                f"click “{PickMode.OFF.value}”), then click in it.",
+            )
+        frame, side = self._looking_at.frame, self._looking_at.side
+        pose, camera = self._pose_and_camera(state, self._looking_at)
         if pose is None or camera is None:
             return Notify(Level.WARNING, f"Frame {frame} has no pose.")
         pixel = picking.pixel_in_frame(camera, pose, origin, direction, PLANE_M)
@@ -174,29 +200,46 @@ class Browser:
             return Notify(Level.INFO, "The click is beside the frame.")
         sighting = Sighting(frame, float(pixel[0]), float(pixel[1]))
         selected = state.annotation.keypoints.get(state.selected_key) if state.selected_key else None
-        if selected is None or (selected.sfm is not None and not selected.sightings and not self._move.value):
-            return PickSighting(sighting)
-        sightings = selected.with_sighting(sighting)
+        is_free = selected is not None and (side.point_of(selected) is None or side.sightings_of(selected))
+        if selected is None or not (is_free or self._move.value):
+            return PickSighting(sighting, side=side)
+        sightings = add_sighting(side.sightings_of(selected), sighting)
         if len(sightings) < 2:
-            return PickSighting(sighting, selected.key)
-        found = triangulated(self._data, recording, sightings)
+            return PickSighting(sighting, selected.key, side=side)
+        found = triangulated(self._data, state.recording, sightings, side)
         if isinstance(found, str):
             self._dispatch(Notify(Level.WARNING, found))
-            return PickSighting(sighting, selected.key)
-        return PickSighting(sighting, selected.key, *found)
+            return PickSighting(sighting, selected.key, side=side)
+        return PickSighting(sighting, selected.key, *found, side=side)
+
+    def _pose_and_camera(self, state: AppState, at: _Looked) -> tuple[RigidTransform | None, Camera | None]:
+        if at.recording is None:
+            photo = self._data.scan().frames_with_images[at.frame]
+            return photo.scan_from_camera, photo.camera
+        return frame_pose(self._data, state, at.frame), self._data.camera(at.recording)
 
     def _pick_camera(self, origin: Floats, direction: Floats) -> Action | None:
+        """Go to the frame of the clicked camera; the phone's have no place on the slider and are looked through."""
         state = self._state()
         trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
-        if trajectory is None or not trajectory.is_localised.any():
+        frames = np.zeros(0, np.int64) if trajectory is None else np.flatnonzero(trajectory.is_localised)
+        photos = self._data.scan().frames_with_images if state.layers.is_visible(Layer.PHONE) else ()
+        poses = [photo.scan_from_camera for photo in photos]
+        if trajectory is not None and len(frames):
+            poses.insert(0, trajectory.poses(frames))
+        if not poses:
             return None
-        frames = np.flatnonzero(trajectory.is_localised)
-        poses = trajectory.poses(frames)
-        forward = poses.rotation.as_matrix()[:, :, 2]
+        every = RigidTransform.concatenate(poses)
+        forward = every.rotation.as_matrix()[:, :, 2]
         found = picking.pick_frustum(
-            np.asarray(poses.translation), forward, origin, direction, FRUSTUM_M, self._tolerance()
+            np.asarray(every.translation), forward, origin, direction, FRUSTUM_M, self._tolerance()
         )
-        return None if found is None else ShowFrame(int(frames[found]))
+        if found is None:
+            return None
+        if found < len(frames):
+            return ShowFrame(int(frames[found]))
+        self.look_with_phone(found - len(frames))
+        return None
 
 
 def _point(values: Floats) -> Point:

@@ -48,7 +48,7 @@ class _Waiting:
 
 
 class RenderProcess:
-    """Answers `Render`, `Frame`, `Cast` and `Describe` one after the other; `Cast` first, it belongs to a click.
+    """Answers `Render`, `Frame`, `Photo`, `Cast`, `Describe` one after the other; `Cast` first, it belongs to a click.
 
     `on_trouble(sentence)` is called from another thread when the process died and was started again.
     """

@@ -8,6 +8,7 @@ import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import cv2
@@ -20,7 +21,7 @@ from gazeloc_core.errors import GazelocError, InputError, RenderError
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.render import RayRenderer, Rendered, Renderer, open_renderer
-from gazeloc_core.scan import Mesh
+from gazeloc_core.scan import Mesh, read_image
 from gazeloc_core.tag_drawing import draw_tags, drawn_tags
 from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.transforms import rigid_from_wxyz
@@ -75,6 +76,14 @@ class Frame:
     width: int = 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Photo:
+    """A picture of the scan's, as stored: JPEG bytes. `camera` is its camera as `Camera.to_json()`, as a string."""
+
+    path: str
+    camera: str
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
     """Rays `origins` and `directions` (N, 3) in the frame `scan` against the scan's mesh: a `CastAnswer`."""
@@ -105,7 +114,7 @@ class Description:
     note: str
 
 
-Job: TypeAlias = Render | Frame | Cast | Describe
+Job: TypeAlias = Render | Frame | Photo | Cast | Describe
 
 
 def work(pipe: Connection, sources: Sources) -> None:
@@ -143,6 +152,8 @@ class _Studio:
                 return jpeg_of(self._render(job).rgb)
             case Frame():
                 return jpeg_of(_fitted(self._frame(job), job.width))
+            case Photo():
+                return jpeg_of(read_image(Path(job.path), camera_from_text(job.camera)))
             case Cast():
                 return self._cast(job)
             case Describe():

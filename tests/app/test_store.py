@@ -59,6 +59,18 @@ def test_a_second_sighting_in_the_same_frame_replaces_the_first():
     assert pair.sfm == (1, 2, 3)
 
 
+def test_clicks_in_the_phones_frames_make_the_scans_side_and_a_click_on_the_mesh_replaces_them():
+    seen = [Sighting(frame, 10.0, 5.0) for frame in (3, 3, 8)]
+    state = apply(fresh(), PickSighting(seen[0], side=Side.SCAN), PickSighting(seen[1], "k1"))
+    state = apply(state, PickSighting(seen[2], "k1", (1, 2, 3), 0.01, side=Side.SCAN))
+    (pair,) = state.annotation.keypoints
+    assert (pair.scan, pair.scan_sigma, pair.scan_sightings) == ((1, 2, 3), 0.01, (seen[0], seen[2]))
+    assert (pair.sfm, pair.sightings) == (None, (seen[1],))
+    (pair,) = apply(state, PickPoint(Side.SCAN, (7, 8, 9), move=True)).annotation.keypoints
+    assert (pair.scan, pair.scan_sigma, pair.scan_sightings) == ((7, 8, 9), None, ())
+    assert pair.sightings == (seen[1],)
+
+
 def test_names_cannot_be_empty_and_disabling_takes_a_pair_out():
     state = apply(fresh(), PickPoint(Side.SCAN, (1, 2, 3)), PickPoint(Side.SFM, (4, 5, 6)), RenamePair("k1", "  "))
     assert state.annotation.keypoints.pairs[0].name == "Keypoint 1"

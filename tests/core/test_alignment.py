@@ -296,3 +296,14 @@ def test_gather_joins_tags_by_id_and_counts_enabled_clicks_only():
     np.testing.assert_array_equal(pairs.scan[4:8], room.scan_tags.corners[5])
     assert pairs.names[-1] == "window"
     assert pairs.weights[:8].sum() * 0.01**2 == pytest.approx(2)  # a tag weighs as one observation
+
+
+def test_what_is_known_about_either_side_of_a_clicked_keypoint_adds_to_its_expected_error():
+    places = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    sigmas = [{}, {"scan_sigma": 0.03}, {"scan_sigma": 0.03, "sfm_sigma": 0.02}]
+    pairs = [
+        KeypointPair(f"k{i}", "", place, tuple(x / 2 for x in place), **sigma)
+        for i, (place, sigma) in enumerate(zip(places, sigmas, strict=True))
+    ]
+    found = gather(None, None, KeypointSet(tuple(pairs)), clicked_sigma_m=0.01).sigma_m
+    np.testing.assert_allclose(found**2, [0.01**2, 0.01**2 + 0.03**2, 0.01**2 + 0.03**2 + 0.04**2])

@@ -73,8 +73,15 @@ def test_damaged_settings_are_named(project: Project, content: str, fragment: st
 
 def test_keypoints_survive_to_the_last_bit(project: Project):
     pair = KeypointPair("k1", "Lamp <b>", (0.1, 1 / 3, -2e-17), None, (Sighting(7, 1.5, 1 / 7),), enabled=False)
-    project.save_keypoints("walk", KeypointSet((pair,)))
-    assert project.keypoints("walk") == KeypointSet((pair,))
+    on_scan = KeypointPair("k2", "Door", (1, 2, 3), scan_sightings=(Sighting(0, 1 / 3, 2.0),), scan_sigma=0.1 / 3)
+    project.save_keypoints("walk", KeypointSet((pair, on_scan)))
+    assert project.keypoints("walk") == KeypointSet((pair, on_scan))
+
+
+def test_keypoints_of_before_the_phones_frames_could_be_clicked_are_read(project: Project):
+    pair = KeypointPair("k1", "Lamp", (1, 2, 3), (4, 5, 6))
+    (value,) = KeypointSet((pair,)).to_json()
+    assert KeypointSet.from_json([{k: v for k, v in value.items() if not k.startswith("scan_")}]).pairs == (pair,)
 
 
 def test_renaming_a_keypoint_leaves_the_alignment_fresh_and_moving_it_does_not(project: Project):

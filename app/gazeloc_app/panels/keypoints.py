@@ -11,7 +11,7 @@ from gazeloc_app.actions import Action, DeletePair, EnablePair, Redo, RenamePair
 from gazeloc_app.data import ProjectData
 from gazeloc_app.residuals import PairResidual, pair_residuals
 from gazeloc_app.state import AppState
-from gazeloc_core.keypoints import KeypointPair
+from gazeloc_core.keypoints import KeypointPair, Point, Sighting
 
 NEW = "(a new pair)"
 RULES = (
@@ -87,16 +87,19 @@ def _label(pair: KeypointPair) -> str:
     return f"{pair.key} · {pair.name}"
 
 
+def _side(point: Point | None, sightings: tuple[Sighting, ...]) -> str:
+    views = f"{len(sightings)} views" if sightings else ""
+    return " ".join(part for part in ("✓" if point is not None else "", views) if part) or "–"
+
+
 def _row(pair: KeypointPair, residual: PairResidual | None, is_selected: bool) -> list[str]:
     color = "inherit" if pair.enabled else widgets.MUTED
     name = widgets.colored(pair.name, color)
-    sightings = f"{len(pair.sightings)} views" if pair.sightings else ""
-    sfm = "✓" if pair.sfm is not None else ""
     return [
         "▸" if is_selected else "",
         f"<b>{name}</b>" if is_selected else name,
-        "✓" if pair.scan is not None else "–",
-        " ".join(part for part in (sfm, sightings) if part) or "–",
+        _side(pair.scan, pair.scan_sightings),
+        _side(pair.sfm, pair.sightings),
         f"{100 * residual.distance_m:.1f}" if residual else "",
         f"{residual.pixels:.0f}" if residual and residual.pixels is not None else "",
     ]

@@ -1,0 +1,124 @@
+"""One browser's clicks, without a page: looking through the phone's cameras, and what clicks in their pictures make."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from gazeloc_app.actions import PickPoint, ShowLayer, Side
+from gazeloc_app.browser import Browser, PickMode
+from gazeloc_app.render_worker import Photo
+from gazeloc_app.scene.frames import PLANE_M
+from gazeloc_app.state import AppState, Layer
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_core.camera import Camera
+from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
+
+CAMERA = Camera.pinhole(960, 720, 720, 720, 470, 350)
+PLACE = np.array([0.1, 0.2, 2.5])
+EYE = np.array([0.0, -3.0, 0.0])
+
+
+@pytest.fixture
+def scan() -> RoomScan:
+    mesh = Mesh(np.array([[-1, 0, 4], [1, 0, 4], [0, 1, 4]]), np.array([[0, 1, 2]]))
+    frames = [
+        ScanFrame(f"frame_{i}", i, CAMERA, RigidTransform.from_translation((x, 0, 0)), picture)
+        for i, (x, picture) in enumerate([(0.0, Path("0.jpg")), (0.5, None), (1.0, Path("2.jpg"))])
+    ]
+    return RoomScan(Path("scan"), "test", mesh, tuple(frames))
+
+
+@pytest.fixture
+def page(scan: RoomScan) -> SimpleNamespace:
+    """A browser whose actions are applied at once; `mode` is its widget's value."""
+    page = SimpleNamespace(state=AppState(("walk",), "walk"), jobs=[])
+    client = MagicMock()
+    client.camera.image_width, client.camera.image_height, client.camera.fov = 1200, 800, 1.0
+    data = MagicMock()
+    data.scan.return_value = scan
+    data.trajectory.return_value = None
+    render = MagicMock()
+    render.submit.side_effect = lambda job, key: page.jobs.append(job) or Future()
+
+    def dispatch(action):
+        page.state = action.apply(page.state)
+
+    page.browser = Browser(client, data, MagicMock(front=0), render, lambda: page.state, dispatch)
+    page.client, page.browser._move.value = client, False
+    return page
+
+
+def set_mode(page: SimpleNamespace, mode: PickMode) -> None:
+    page.browser._mode.value = mode
+    page.browser._last_click = (0.0, np.zeros(3))
+
+
+def look(page: SimpleNamespace, scan: RoomScan, frame: int) -> None:
+    """Click the camera of one of the frames that have a picture."""
+    set_mode(page, PickMode.OFF)
+    centre = np.asarray(scan.frames_with_images[frame].scan_from_camera.translation)
+    page.browser.click(EYE, centre + np.array([0, 0, 0.05]) - EYE)
+
+
+def click_spot(page: SimpleNamespace, scan: RoomScan, frame: int, place: np.ndarray = PLACE) -> None:
+    """Click, from beside the camera, the pixel of the picture where the place is."""
+    set_mode(page, PickMode.FRAME)
+    pose = scan.frames_with_images[frame].scan_from_camera
+    local = pose.inv().apply(place)
+    in_picture = pose.apply(local / local[2] * PLANE_M)
+    page.browser.click(EYE, in_picture - EYE)
+
+
+def test_a_click_on_the_phones_camera_looks_through_it(page, scan):
+    look(page, scan, 1)
+    (job,) = page.jobs
+    assert isinstance(job, Photo)
+    assert job.path == "2.jpg"
+    np.testing.assert_allclose(page.client.camera.position, [1, 0, 0])
+
+
+def test_a_camera_without_a_picture_or_in_a_hidden_layer_is_not_looked_through(page, scan):
+    set_mode(page, PickMode.OFF)
+    page.browser.click(EYE, np.array([0.5, 0, 0.05]) - EYE)
+    page.state = ShowLayer(Layer.PHONE, False).apply(page.state)
+    look(page, scan, 0)
+    assert page.jobs == []
+
+
+def test_one_spot_clicked_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page, scan):
+    for frame in (0, 1):
+        look(page, scan, frame)
+        click_spot(page, scan, frame)
+    (pair,) = page.state.annotation.keypoints
+    np.testing.assert_allclose(pair.scan, PLACE, atol=1e-6)
+    assert [sighting.frame_index for sighting in pair.scan_sightings] == [0, 1]
+    assert pair.scan_sigma > 0
+    assert pair.sfm is None
+    assert pair.sightings == ()
+
+
+def test_a_click_in_a_picture_does_not_move_a_place_that_was_clicked_on_the_mesh(page, scan):
+    page.state = PickPoint(Side.SCAN, (1, 2, 3)).apply(page.state)
+    look(page, scan, 0)
+    click_spot(page, scan, 0)
+    assert [pair.scan for pair in page.state.annotation.keypoints] == [(1, 2, 3), None]
+
+
+def test_clicks_on_different_things_give_no_place_and_say_so(page, scan):
+    for frame, place in ((0, PLACE), (1, PLACE + np.array([0, 0.4, 0]))):
+        look(page, scan, frame)
+        click_spot(page, scan, frame, place)
+    assert page.state.annotation.keypoints.pairs[0].scan is None
+    assert "disagree" in page.state.notice.text
+
+
+def test_moving_the_frame_slider_leaves_the_phones_picture(page, scan):
+    look(page, scan, 0)
+    page.browser.render(page.state)
+    assert len(page.jobs) == 1
