@@ -1,7 +1,7 @@
 """What a person recognises in several pictures of the chair scan, simulated.
 
-Feature tracks of a reconstruction of all pictures, the glasses' half and the phone's. Nothing else uses it, and it knows
-no pose of ARKit's.
+By feature tracks of a reconstruction of all pictures, of the glasses' half and the phone's. Nothing else uses it, and
+it knows no pose of ARKit's.
 """
 
 from __future__ import annotations
