@@ -58,7 +58,7 @@ class TagOptions:
     family: str = "tag36h11"
     """Tag family as printed, e.g. tag36h11 or tagStandard41h12."""
     quad_decimate: float = 1.0
-    """Search at 1/this of the resolution: 2 is four times as fast and loses the far tags (85 instead of 95 %)."""
+    """Search at 1/this of the resolution: 2 takes a third of the time and loses far tags (85 instead of 95 %)."""
     sharpening: float = 0.25
     """How much tag bits are sharpened before they are read; 0 loses blurred and far tags."""
     min_decision_margin: float = 8.0
