@@ -43,14 +43,14 @@ class StageStatus:
     reason: str
 
 
-def statuses(project: Project, only: str | None = None) -> list[StageStatus]:
+def statuses(project: Project, only: str | None = None, method: Method | None = None) -> list[StageStatus]:
     """How every stage of the scan and of each recording (or one) stands. Opens no video and runs nothing.
 
-    Stages of the method that a recording is shown with, and of all methods that have run on it. A stage whose inputs
-    are missing is missing itself; one whose inputs are stale is stale.
+    Stages of one method, by default of that which a recording is shown with and of all that have run on it. A stage
+    whose inputs are missing is missing itself; one whose inputs are stale is stale.
     """
     names = _recordings(project, only)
-    used = {name: {project.method(name), *methods_with_poses(project, name)} for name in names}
+    used = {name: {method} if method else {project.method(name), *methods_with_poses(project, name)} for name in names}
     by_any = frozenset[Method]().union(*used.values()) or {Method.SFM}
     found = [_status(project, stage, None) for stage in _needed(project, by_any) if stage.of_scan]
     for name in names:

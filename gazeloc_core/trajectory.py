@@ -100,6 +100,12 @@ class Trajectory:
         """(N,) whether each frame was localised by what it shows itself: registered, or by its tags."""
         return np.isin(self.status, [PoseStatus.REGISTERED.value, PoseStatus.TAG_ONLY.value])
 
+    @property
+    def localised_keyframes(self) -> Ints:
+        """The keyframes (K,) that were localised, which is what views show; all localised frames where none was."""
+        keyframes = np.flatnonzero(self.is_localised & self.is_keyframe)
+        return keyframes if len(keyframes) else np.flatnonzero(self.is_localised)
+
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of which kind."""
         return {

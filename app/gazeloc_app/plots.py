@@ -29,6 +29,7 @@ def to_plotly(drawing: Drawing) -> go.Figure:
         legend={"orientation": "h", "y": -0.2},
         font={"size": 11},
         template="plotly_white",
+        modebar={"remove": ["zoom", "pan", "select", "lasso", "zoomIn", "zoomOut", "autoScale", "resetScale"]},
     )
     if isinstance(drawing, Chart) and drawing.log_y:
         figure.update_yaxes(type="log")

@@ -263,4 +263,4 @@ def _phone_poses(frames: Any) -> RigidTransform | None:
 def _localised_poses(trajectory: Trajectory | None) -> RigidTransform | None:
     if trajectory is None or not trajectory.is_localised.any():
         return None
-    return trajectory.poses(np.flatnonzero(trajectory.is_localised))
+    return trajectory.poses(trajectory.localised_keyframes)

@@ -57,10 +57,9 @@ def trajectory_picture(project: Project, recording: str) -> Bytes:
 
 
 def _with_estimate(room: View, trajectory: Trajectory) -> View:
-    localised = np.flatnonzero(trajectory.is_localised)
-    if len(localised) == 0:
+    chosen = trajectory.localised_keyframes
+    if len(chosen) == 0:
         return room
-    chosen = localised[:: max(1, len(localised) // 100)]
     poses = rigid_from_wxyz(trajectory.wxyz[chosen].reshape(-1, 4), trajectory.centers[chosen].reshape(-1, 3))
     return with_cameras(room, poses, RED)
 

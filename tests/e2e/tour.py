@@ -19,11 +19,23 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS.parent / "app")]
 
 from e2e.app_page import AppPage  # noqa: E402
 from e2e.page import ViewerPage, chromium_path, launch  # noqa: E402
-from gazeloc_app.actions import PickPoint, RenamePair, SelectPair, ShowFrame, Side  # noqa: E402
+from gazeloc_app import tasks  # noqa: E402
+from gazeloc_app.actions import (  # noqa: E402
+    CompareMethod,
+    DrawTags,
+    PickPoint,
+    RenamePair,
+    SelectPair,
+    ShowFrame,
+    Side,
+    StartJob,
+)
 from gazeloc_app.app import App  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
 
+from gazeloc_core.methods import Method  # noqa: E402
 from gazeloc_core.project import Project  # noqa: E402
+from gazeloc_core.stages import inputs  # noqa: E402
 
 OUT = TESTS.parent / "static" / "tour"
 WIDTH, HEIGHT = 1600, 900
@@ -68,11 +80,29 @@ def _walk(page: AppPage, app: App) -> None:
     page.tab("Align")
     _place(app, (-0.35, 0.5, 0.2), 1.0)
     _shoot(page, "align")
+    page.tab("Methods")
+    app.store.dispatch(CompareMethod(Method.TAGS, True))
+    app.store.dispatch(CompareMethod(Method.TAGS_PAPER, True))
+    app.store.dispatch(DrawTags(True))
+    _show(page, app, _frame_with_most_tags(app))
+    _place(app, (0.27, 0.42, 0.32), 0.85)
+    _shoot(page, "methods")
+    app.store.dispatch(StartJob("Draw the figures", tasks.draw_figures, (("recording", "glasses"),)))
+    page.tab("Figures").until(lambda: page.state.job is None)
+    page.choose("Figure", "Figure 5, glasses")
+    _shoot(page, "figures")
+    for action in (CompareMethod(Method.TAGS, False), CompareMethod(Method.TAGS_PAPER, False), DrawTags(False)):
+        app.store.dispatch(action)
     _show(page, app, int(registered[len(registered) // 2]))
     page.tab("Layers")
     for client in app.server.get_clients().values():
         app._browsers[client.client_id].look(app.store.state.frame)
     _shoot(page, "frame")
+
+
+def _frame_with_most_tags(app: App) -> int:
+    sightings = inputs.load_sightings(app.project.artifact("glasses", "tags").read_arrays())
+    return int(np.bincount(sightings.frame_index).argmax())
 
 
 def _show(page: AppPage, app: App, frame: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import plotly.graph_objects as go
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
@@ -21,13 +22,12 @@ class FigurePanel:
     def __init__(self, gui: GuiApi, data: ProjectData, dispatch: Callable[[Action], None]):
         self._data = data
         self._dispatch = dispatch
-        self._gui = gui
         self._recording = ""
         self._seen: object = None
         self._draw = gui.add_button("Draw the figures", hint="From the tags that were found; takes some seconds.")
         self._which = gui.add_dropdown("Figure", (NONE,))
         self._notes = gui.add_html("")
-        self._plot: object = None
+        self._plot = gui.add_plotly(go.Figure(), aspect=0.9, visible=False)
         widgets.on_user(self._draw, lambda _: self._start(), event="on_click")
         widgets.on_user(self._which, lambda event: self._show(str(event.target.value)))
 
@@ -49,11 +49,9 @@ class FigurePanel:
     def _show(self, name: str) -> None:
         charts, _ = self._data.figures(self._recording) or ({}, ())
         chart = charts.get(name)
-        if self._plot is not None:
-            self._plot.remove()  # type: ignore[attr-defined]
-            self._plot = None
+        widgets.set_property(self._plot, "visible", chart is not None)
         if chart is not None:
-            self._plot = self._gui.add_plotly(to_plotly(chart), aspect=0.9)
+            self._plot.figure = to_plotly(chart)
 
     def _start(self) -> None:
         self._dispatch(StartJob("Draw the figures", tasks.draw_figures, (("recording", self._recording),)))

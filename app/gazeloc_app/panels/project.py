@@ -86,9 +86,11 @@ class ProjectPanel:
                     widgets.colored(status.state.value, _COLORS[status.state]),
                     widgets.colored(status.reason[:160], widgets.MUTED),
                 ]
-                for status in pipeline.statuses(self._project, state.recording)
+                for status in pipeline.statuses(self._project, state.recording, state.annotation.method)
             ]
-            widgets.set_content(self._stages, widgets.box(widgets.html_table(["Stage", "", ""], rows)))
+            widgets.set_content(
+                self._stages, widgets.box(widgets.html_table([f"Method {state.annotation.method}", "", ""], rows))
+            )
 
     def _run_method(self) -> None:
         keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
