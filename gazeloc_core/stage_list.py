@@ -104,7 +104,6 @@ _SHARED: tuple[Stage, ...] = (
     Stage(
         name="tags",
         title="Find tags in the glasses' frames",
-        methods=WITH_TAGS,
         weight=30,
         run=lambda project, name, report: recording.detect_recording_tags(project, name, report=report),
         inputs=recording.tag_inputs,

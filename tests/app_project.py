@@ -166,15 +166,16 @@ def _write_stages(project: Project, name: str, mesh: Mesh, tags: bool) -> None:
     )
     recording.undistort(project, name)
     camera = inputs.load_undistorted_camera(project, name)
+    if tags:
+        project.artifact(name, "tags").write_arrays(
+            inputs.sightings_arrays(_no_sightings()), options={}, inputs=recording.tag_inputs(project, name)
+        )
     project.artifact(name, "reconstruction").write_arrays(
         inputs.model_arrays([_model(mesh, camera, keyframes)]),
         options={},
         inputs=recording.reconstruction_inputs(project, name),
     )
     if tags:
-        project.artifact(name, "tags").write_arrays(
-            inputs.sightings_arrays(_no_sightings()), options={}, inputs=recording.tag_inputs(project, name)
-        )
         on_scan = mark_corners()
         in_sfm = TagCorners(on_scan.tag_id, SFM_FROM_SCAN.apply(on_scan.corners), on_scan.sightings, on_scan.spread)
         project.artifact(name, "corners").write_arrays(
