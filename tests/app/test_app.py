@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import errno
 import threading
-import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from app_project import SFM_FROM_SCAN, make_app_project, true_poses
+from app_steps import step, stop, wait_for_job
 from gazeloc_app import tasks
 from gazeloc_app.actions import (
     ChooseAlignment,
@@ -51,29 +51,6 @@ def app(project):
     app.store._render()
     yield app
     stop(app)
-
-
-def stop(app):
-    app.jobs.stop()
-    app._render.close()
-    app.server.stop()
-    app._lock.release()
-
-
-def step(app, *actions):
-    for action in actions:
-        app.store.dispatch(action)
-    app.store.step()
-
-
-def wait_for_job(app, seconds=90.0):
-    """Step until the job has ended."""
-    end = time.monotonic() + seconds
-    app.store.step()
-    while app.store.state.job is not None:
-        assert time.monotonic() < end, "the job did not end"
-        time.sleep(0.05)
-        app.store.step()
 
 
 def widgets(app, label):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from app_project import make_app_project, true_poses
+from app_steps import step, stop, wait_for_job
 from gazeloc_app import tasks
 from gazeloc_app.actions import ChooseMethod, CompareMethod, DrawTags, JobEnded, ShowFrame, StartJob, Undo
 from gazeloc_app.app import App
@@ -30,16 +29,7 @@ def app(project):
     app = App(project, port=0)
     app.store._render()
     yield app
-    app.jobs.stop()
-    app._render.close()
-    app.server.stop()
-    app._lock.release()
-
-
-def step(app, *actions):
-    for action in actions:
-        app.store.dispatch(action)
-    app.store.step()
+    stop(app)
 
 
 def panel(app) -> MethodPanel:
@@ -106,11 +96,7 @@ def test_renders_of_compared_methods_stand_side_by_side_and_say_where_there_is_n
 def test_a_method_that_cannot_run_is_a_sentence(app, project):
     keywords = (("recording", "walk"), ("method", Method.SFM_PAPER))
     step(app, StartJob("Run sfm-paper", tasks.run_all, keywords))
-    end = time.monotonic() + 90
-    while app.store.state.job is not None:
-        assert time.monotonic() < end, "the job did not end"
-        time.sleep(0.05)
-        app.store.step()
+    wait_for_job(app)
     assert app.store.state.notice.level is Level.ERROR
     assert "three tags on both sides" in app.store.state.notice.text
     assert Method.SFM_PAPER not in fresh_methods(project, "walk")
