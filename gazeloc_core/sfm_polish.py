@@ -16,6 +16,8 @@ import pycolmap
 
 LOSS_PX = 1.0
 """Errors beyond this count ever less (Cauchy): false matches of dim frames must not weigh with their squares."""
+MOST_PX = 8.0
+"""Points that are off by more than this after that are no points."""
 LEAST_VIEWS = 3
 LEAST_OBSERVATIONS = 30
 """A frame with fewer of these observations keeps its points of two views: better weak than loose."""
@@ -31,6 +33,8 @@ def polish(model: Any) -> None:
         model.frames[frame_id].rig_from_world = strong.frames[frame_id].rig_from_world
     _adjust(model, poses=False)
     model.update_point_3d_errors()
+    for point_id in [key for key, point in model.points3D.items() if point.error > MOST_PX]:
+        model.delete_point3D(point_id)
 
 
 def _weak_points(model: Any) -> list[int]:

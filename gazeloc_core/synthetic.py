@@ -109,10 +109,10 @@ def _hard(options: SceneOptions, tag_ids: tuple[int, ...]) -> SceneOptions:
         options,
         tag_ids=tag_ids,
         bare=True,
-        hurry=1.5,
-        glasses_seconds=14.0,
-        glasses_exposure_s=0.010,
-        glasses_gain=0.16,
+        hurry=1.2,
+        glasses_seconds=17.0,
+        glasses_gain=0.22,
+        video_crf=25,
     )
 
 
