@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,10 @@ from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.evaluation import evaluate_recording
 from gazeloc_core.stages.poses import fresh_trajectory
+from gazeloc_core.stages.recording import image_name, load_keyframes
+from gazeloc_core.synthesis.hardness import hardness, plain_colmap_share
+from gazeloc_core.synthesis.routes import RouteName
+from gazeloc_core.synthetic import PRESETS
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
 
@@ -25,14 +30,44 @@ METHODS = (Method.TAGS_PAPER, Method.TAGS, Method.SFM_PAPER, Method.SFM)
 
 def table_2(workspace: Workspace, report: Report) -> Finding:
     """The paper's Table II on scenes of ours (or on a user's project that has a truth)."""
-    rows: list[Row] = []
     if workspace.project_folder is not None:
         rows = _rows("", Project.open(workspace.project_folder))
-    else:
-        for number, preset in enumerate(workspace.presets):
-            share = part(report, number / len(workspace.presets), (number + 1) / len(workspace.presets))
-            rows += _rows(preset, _project(workspace, preset, share))
-    return Finding(text=_summary(rows), tables={"methods": rows})
+        return Finding(text=_summary(rows), tables={"methods": rows})
+    rows, hard = [], []
+    for number, preset in enumerate(workspace.presets):
+        share = part(report, number / len(workspace.presets), (number + 1) / len(workspace.presets))
+        project = _project(workspace, preset, share)
+        rows += _rows(preset, project)
+        if "hard" in preset:
+            hard += [_hardness(workspace.scene(preset), preset, project, route) for route in PRESETS[preset].routes]
+    tables = {"methods": rows} | ({"hardness": hard} if hard else {})
+    return Finding(text=f"{_summary(rows)} {_hardness_text(hard)}".strip(), tables=tables)
+
+
+def _hardness(scene: Path, preset: str, project: Project, route: RouteName) -> Row:
+    """What makes a recording hard, and the share of its keyframes that plain COLMAP holds in its largest model."""
+    facts = hardness(scene, PRESETS[preset], route)
+    names = [image_name(index) for index in load_keyframes(project, route).tolist()]
+    images = project.artifact(route, "undistorted").folder / "images"
+    return {
+        "scene": preset,
+        "recording": route,
+        "mean_grey": facts.mean_grey,
+        "blur_p90_px": facts.blur_p90_px,
+        "turn_p90_deg_per_s": facts.turn_p90_deg_per_s,
+        "plain_colmap_share": plain_colmap_share(images, names, inputs.load_undistorted_camera(project, route)),
+    }
+
+
+def _hardness_text(rows: list[Row]) -> str:
+    if not rows:
+        return ""
+    grey, blur, share = ([row[name] for row in rows] for name in ("mean_grey", "blur_p90_px", "plain_colmap_share"))
+    return (
+        f"The hard recordings have a mean grey of {min(grey):.0f} to {max(grey):.0f}, a 90th-percentile blur of "
+        f"{min(blur):.1f} to {max(blur):.1f} px, and the largest model of plain COLMAP holds {min(share):.0%} to "
+        f"{max(share):.0%} of their keyframes."
+    )
 
 
 def _project(workspace: Workspace, preset: str, report: Report) -> Project:
@@ -109,17 +144,22 @@ def _shows_mapped_tag(project: Project, recording: str, frames: int) -> Bools:
 
 
 def _summary(rows: list[Row]) -> str:
-    sentences = []
-    for method in METHODS:
-        mine = [row for row in rows if row["method"] == method.value and "position_cm" in row]
-        if not mine:
-            continue
-        position, rotation = (np.mean([row[name] for row in mine]) for name in ("position_cm", "rotation_deg"))
-        share = np.mean([row["share"] for row in mine])
-        sentences.append(f"`{method}` {position:.1f} cm and {rotation:.2f}°, {share:.0%} of the keyframes")
+    kinds = {"plain": [r for r in rows if "hard" not in r["scene"]], "hard": [r for r in rows if "hard" in r["scene"]]}
+    said = " ".join(f"{name.capitalize()} scenes: {_means(some)}." for name, some in kinds.items() if some)
     return (
         "Mean errors of registered keyframes against the exact truth, nothing aligned to it first, over "
-        f"{len({(row['scene'], row['recording']) for row in rows})} recordings: {'; '.join(sentences)}. "
+        f"{len({(row['scene'], row['recording']) for row in rows})} recordings. {said} "
         "The columns `tag_frames_…` are over all frames that show a tag of the scan. The paper's own rows are 0.31 to "
         "0.95 m and 10 to 18° with tags, 5 to 10 cm and 0.68 to 2.2° with COLMAP."
     )
+
+
+def _means(rows: list[Row]) -> str:
+    sentences = []
+    for method in METHODS:
+        mine = [row for row in rows if row["method"] == method.value and "position_cm" in row]
+        if mine:
+            position, rotation = (np.mean([row[name] for row in mine]) for name in ("position_cm", "rotation_deg"))
+            share = np.mean([row["share"] for row in mine])
+            sentences.append(f"`{method}` {position:.1f} cm and {rotation:.2f}°, {share:.0%} of the keyframes")
+    return "; ".join(sentences)
