@@ -1,4 +1,5 @@
-"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | export | tags | demo`.
+"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | export | tags | advise |
+demo`.
 
 Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
 code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
@@ -269,6 +270,26 @@ def tags(
 
 
 @deferred
+def advise(
+    *, width: float, length: float, focal_px: float = 766.0, view_deg: float = 82.0, quick: Flag = False
+) -> None:
+    """Say which tag size, and how many, a room needs so that a wearer mostly sees a tag in its safe range.
+
+    Draws, searches and solves thousands of tags first, which takes some minutes.
+
+    Args:
+        width: One side of the room in metres.
+        length: The other side.
+        focal_px: Focal length of the glasses' camera in pixels; the default is Pupil Invisible's.
+        view_deg: Its horizontal field of view in degrees.
+        quick: A coarse answer in seconds.
+    """
+    from gazeloc_app.advice import advise as print_advice
+
+    print_advice(width_m=width, length_m=length, focal_px=focal_px, view_deg=view_deg, quick=quick)
+
+
+@deferred
 def demo(*, port: int = 8080) -> None:
     """Open the app on the sample scene that GazeLoc brings along.
 
@@ -290,6 +311,7 @@ COMMANDS: dict[str, Any] = {
     "protocol": protocol,
     "export": export,
     "tags": tags,
+    "advise": advise,
     "demo": demo,
 }
 

@@ -163,6 +163,22 @@ class ProjectData:
         artifact = self.project.artifact(recording, "pieces")
         return self._read(f"{recording} pieces", artifact, lambda: placed_pieces(self.project, recording)) or []
 
+    def piece_reasons(self, recording: str) -> tuple[str, ...]:
+        """Why each smaller piece of the reconstruction has a place in the scan, or none."""
+        artifact = self.project.artifact(recording, "pieces")
+        return self._read(f"{recording} piece reasons", artifact, lambda: artifact.header().notes) or ()
+
+    def tag_support(self, recording: str, method: Method, frame: int) -> str:
+        """What a frame's pose rests on where tags alone gave it, a sentence; "" for other methods and without pose."""
+        artifact = self.project.result(recording, method, "trajectory")
+        columns = self._read(f"{recording} {method} columns", artifact, artifact.read_arrays)
+        if columns is None or "tags_used" not in columns or frame >= len(columns["tags_used"]):
+            return ""
+        used, off_m = int(columns["tags_used"][frame]), float(columns["disagreement_m"][frame])
+        if used == 0:
+            return "Its tag has two possible poses." if bool(columns["is_ambiguous"][frame]) else ""
+        return f"Rests on {used} tag{'s' if used > 1 else ''}; the worst is {100 * off_m:.1f} cm from its place."
+
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
         """The ground truth: times and `scan_from_camera`."""
         entry = self._remember(f"{recording} entry", None, lambda: self.project.recording(recording))

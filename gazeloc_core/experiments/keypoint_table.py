@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from gazeloc_core.charts import Chart, Series
-from gazeloc_core.experiments.case import Case
 from gazeloc_core.experiments.finding import Finding
 from gazeloc_core.experiments.workspace import Workspace
-from gazeloc_core.keypoint_count import KeypointCountErrors, KeypointCountOptions, exact_pairs, keypoint_count_errors
+from gazeloc_core.keypoint_count import KeypointCountOptions
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
-from gazeloc_core.project import Project
+from gazeloc_core.stages.figures import count_chart, count_errors, count_series
 
 
 def figure_8(workspace: Workspace, report: Report) -> Finding:
@@ -24,8 +20,7 @@ def figure_8(workspace: Workspace, report: Report) -> Finding:
     for name, far_apart in (("anywhere", False), ("far apart", True)):
         errors = count_errors(project, recording, KeypointCountOptions(draws=draws, far_apart=far_apart))
         counts, position_m, rotation_deg = errors.spread()
-        low, middle, high = 100 * position_m.T
-        series.append(Series(name, counts.astype(np.float64), middle, low=low, high=high))
+        series.append(count_series(name, errors))
         rows += [
             {
                 "keypoints": int(count),
@@ -35,21 +30,8 @@ def figure_8(workspace: Workspace, report: Report) -> Finding:
             }
             for count, position, rotation in zip(counts, position_m, rotation_deg, strict=True)
         ]
-    chart = Chart("Figure 8", "keypoints", "mean camera error [cm], 10 to 90 % of draws", tuple(series))
+    chart = count_chart(tuple(series))
     return Finding(text=_summary(rows, draws), tables={"errors": rows}, charts={"errors": chart})
-
-
-def count_errors(project: Project, recording: str, options: KeypointCountOptions) -> KeypointCountErrors:
-    """The errors of one recording's cameras; its truth places the exact keypoints.
-
-    Raises:
-        InputError: if the recording has no truth.
-        GeometryError: if fewer than three registered frames have one.
-    """
-    case = Case.of_project(project, recording)
-    well = (case.model.track_lengths >= 4) & (case.model.point_errors_px < 1.0)
-    exact = exact_pairs(case.model.points[well], case.best)
-    return keypoint_count_errors(exact, case.model.sfm_from_camera[case.images], case.scan_from_camera, options)
 
 
 def _summary(rows: list[dict[str, object]], draws: int) -> str:

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from gazeloc_core import pipeline
-from gazeloc_core.experiments.case import Case
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.overview import View, look_into, side_by_side, with_points
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.case import Case
 from gazeloc_core.stages.recording import load_keyframes
 
 

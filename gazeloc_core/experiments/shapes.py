@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.experiments.case import Case
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.overview import View, look_into, side_by_side, with_points
 from gazeloc_core.experiments.workspace import Workspace
@@ -17,6 +16,7 @@ from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.scan import Mesh
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.case import Case
 from gazeloc_core.stages.poses import placed_models
 from gazeloc_core.surfaces import delaunay_surface, poisson_surface
 from gazeloc_core.transforms import Similarity

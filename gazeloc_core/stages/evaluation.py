@@ -70,4 +70,6 @@ def verdicts(project: Project, recording: str, method: Method = Method.SFM) -> l
         return []
     refinement = project.artifact(recording, "refinement")
     notes = [("refinement", note) for note in refinement.header().notes] if refinement.exists else []
+    pieces = project.artifact(recording, "pieces")
+    notes += [("pieces", note) for note in pieces.header().notes] if pieces.exists else []
     return [(verdict.level, verdict.text) for verdict in alignment.verdicts] + notes

@@ -14,9 +14,11 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.charts import Chart, Drawing, Series, chart_from_json
 from gazeloc_core.errors import GazelocError, InputError, ProjectError
 from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.keypoint_count import KeypointCountErrors, KeypointCountOptions, exact_pairs, keypoint_count_errors
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.case import Case
 from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
 from gazeloc_core.stages.scan import tag_entry
 from gazeloc_core.tag_analysis import PlaceErrors, SolverAnalysis, analyse_solver, tag_place_errors
@@ -51,6 +53,16 @@ def draw_figures(project: Project, recording: str, report: Report = silent) -> d
             charts |= tag_charts(project, views())
         except GazelocError as error:
             notes.append(str(error))
+    report(0.8, "drawing keypoints")
+    try:
+        charts["Figure 8"] = count_chart(
+            tuple(
+                count_series(name, count_errors(project, recording, KeypointCountOptions(far_apart=far_apart)))
+                for name, far_apart in (("anywhere", False), ("far apart", True))
+            )
+        )
+    except GazelocError as error:
+        notes.append(str(error))
     project.artifact(recording, "figures").write(
         lambda folder: write_json_atomically(folder / _FILE, {name: chart.to_json() for name, chart in charts.items()}),
         options={},
@@ -164,3 +176,28 @@ def angle_chart(views: TagViews, analysis: SolverAnalysis, tag: int) -> Chart:
         Series(f"about {axis}", frame, analysis.euler_deg[mine][:, i], "points") for i, axis in enumerate("xyz")
     )
     return Chart(f"Figure 5, angles, {views.device}, tag {tag}", "frame", "viewing angle [°]", series)
+
+
+def count_errors(project: Project, recording: str, options: KeypointCountOptions) -> KeypointCountErrors:
+    """The errors of one recording's cameras; its truth places the exact keypoints.
+
+    Raises:
+        InputError: if the recording has no truth.
+        GeometryError: if fewer than three registered frames have one.
+    """
+    case = Case.of_project(project, recording)
+    well = (case.model.track_lengths >= 4) & (case.model.point_errors_px < 1.0)
+    exact = exact_pairs(case.model.points[well], case.best)
+    return keypoint_count_errors(exact, case.model.sfm_from_camera[case.images], case.scan_from_camera, options)
+
+
+def count_series(name: str, errors: KeypointCountErrors) -> Series:
+    """The median error by the number of keypoints, with the band from 10 to 90 % of the draws, in centimetres."""
+    counts, position_m, _ = errors.spread()
+    low, middle, high = 100 * position_m.T
+    return Series(name, counts.astype(np.float64), middle, low=low, high=high)
+
+
+def count_chart(series: tuple[Series, ...]) -> Chart:
+    """Figure 8."""
+    return Chart("Figure 8", "keypoints", "mean camera error [cm], 10 to 90 % of draws", series)

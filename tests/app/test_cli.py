@@ -276,3 +276,20 @@ def test_what_takes_long_to_import_is_not_imported_needlessly(home: Path, words:
     imported = set(done.stdout.splitlines()[-1].split())
     assert "gazeloc_core" in imported
     assert not imported & absent
+
+
+def test_advice_on_tags_is_a_table_of_shares(capsys, monkeypatch):
+    from gazeloc_app import advice
+
+    small = advice.SafeRangeOptions
+    monkeypatch.setattr(
+        advice,
+        "SafeRangeOptions",
+        lambda **given: small(**(given | {"pixels": (33, 115), "angles_deg": (0, 40), "repeats": 2})),
+    )
+    said = answer(capsys, "advise", "--width", "3", "--length", "4", "--quick")
+    rows = [line.split() for line in said.splitlines() if line.split() and line.split()[0].isdigit()]
+    assert [int(row[0]) for row in rows] == [4, 6, 8, 10, 12, 16, 20, 24]
+    shares = [[int(cell.rstrip("%")) for cell in row[1:]] for row in rows]
+    assert all(0 <= share <= 100 for row in shares for share in row)
+    assert shares[-1][-1] >= shares[0][0], "more and larger tags are seen more often"

@@ -107,3 +107,28 @@ def test_drawing_tags_changes_the_frames_url_only(app):
     step(app, DrawTags(True))
     assert app.store.state.draws_tags
     assert app.store.state.annotation == before.annotation
+
+
+def test_the_frame_says_what_a_pose_by_tags_rests_on(app, project):
+    write_poses(project, Method.TAGS, 0.05)
+    artifact = project.result("walk", Method.TAGS, "trajectory")
+    columns = artifact.read_arrays()
+    count = len(columns["timestamp_ns"])
+    is_seen = np.arange(count) % 2 == 0
+    columns |= {
+        "tags_used": np.where(is_seen, 2, 0),
+        "disagreement_m": np.where(is_seen, 0.034, np.nan),
+        "is_ambiguous": ~is_seen,
+    }
+    artifact.write_arrays(columns, options={}, inputs={"made": "up"})
+    assert app.data.tag_support("walk", Method.TAGS, 2) == "Rests on 2 tags; the worst is 3.4 cm from its place."
+    assert app.data.tag_support("walk", Method.TAGS, 3) == "Its tag has two possible poses."
+    assert app.data.tag_support("walk", Method.SFM, 2) == ""
+
+
+def test_figures_are_drawn_where_there_is_something_to_draw_and_say_what_is_missing(app, project):
+    step(app, StartJob("Draw the figures", tasks.draw_figures, (("recording", "walk"),)))
+    wait_for_job(app)
+    charts, notes = app.data.figures("walk")
+    assert list(charts) == ["Figure 8"], "the small project has a truth, but no sightings of tags"
+    assert sum("no tag was found" in note for note in notes) == 2

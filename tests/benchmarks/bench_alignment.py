@@ -22,11 +22,11 @@ from gazeloc_core.alignment import Alignment, align, judge
 from gazeloc_core.arrays import Floats
 from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.evaluate import match_times
-from gazeloc_core.experiments.case import Case
 from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.refine import Refinement, refine
 from gazeloc_core.stages import registration
+from gazeloc_core.stages.case import Case
 from gazeloc_core.truth import read_tum
 
 CM = 0.01

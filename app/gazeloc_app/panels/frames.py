@@ -94,7 +94,8 @@ class FramePanel:
         status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
         seconds = (int(recording.timestamp_ns[frame]) - int(recording.timestamp_ns[0])) / 1e9
         facts = [f"Frame {frame} of {len(recording)} · {seconds:.2f} s · {STATUS_TEXT[status]}"]
-        facts += [self._error_text(state, frame), state.renderer_note]
+        support = self._data.tag_support(state.recording, state.annotation.method, frame)
+        facts += [support, self._error_text(state, frame), state.renderer_note]
         widgets.set_content(self._facts, widgets.box("<br>".join(widgets.text(fact) for fact in facts if fact)))
 
     def _comparison_html(self, state: AppState, frame: int, has_pose: bool) -> str:
