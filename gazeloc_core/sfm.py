@@ -1,8 +1,10 @@
 """Structure from motion on undistorted keyframes: pycolmap with known, fixed intrinsics.
 
-The steps: SIFT features on the CPU; pairs of frames near in time, and frames that look alike (`sfm_pairs.py`); matching
-with geometric verification; incremental mapping. Frames that stay out are then matched with all others and the mapping
-is done once more. Mapping works in a thread of its own, so that progress is shown and a cancel reaches it.
+The steps: SIFT features on the CPU, and the corners of tags (`sfm_tags.py`); more frames where neighbours share little
+(`sfm_bridges.py`); pairs of frames near in time, and frames that look alike (`sfm_pairs.py`); matching with geometric
+verification; incremental mapping; a last adjustment (`sfm_polish.py`). Keyframes that stay out are then matched with
+all others and the mapping is done once more. Mapping works in a thread of its own, so that progress is shown and a
+cancel reaches it.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +25,7 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.colmap_io import read_model
 from gazeloc_core.errors import InputError, ReconstructionError
 from gazeloc_core.progress import Report, part, silent
+from gazeloc_core.sfm_bridges import MoreFrames, frames_in_gaps
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.sfm_pairs import Pairs, choose_pairs
 from gazeloc_core.sfm_polish import polish
@@ -51,6 +54,10 @@ class SfmOptions:
     """Each frame is matched with this many following ones, and with those 8, 16, 32, ... later."""
     similar_neighbours: int = 7
     """Each frame is matched with this many others that look alike, wherever they are in time."""
+    weak_link: int = 60
+    """Neighbouring keyframes with fewer matches than this get the frames between them as well; 0: never."""
+    least_views: int = 3
+    """In the last adjustment points that fewer frames show do not move cameras; 2: all do."""
     exhaustive_up_to: int = 32
     """Recordings with no more keyframes than this are matched in all pairs."""
     threads: int = -1
@@ -69,12 +76,14 @@ def reconstruct(
     report: Report = silent,
     *,
     sightings: TagSightings | None = None,
+    more_frames: MoreFrames | None = None,
 ) -> list[SfmModel]:
     """Models of the pictures `names` in `image_folder`, all of one `camera`, the one with the most pictures first.
 
     `frame_indices` (K,) are the recording's frames of the names. `work_folder` receives the database and may be thrown
     away afterwards; what an earlier run left there is overwritten. `sightings` are tags in the same undistorted frames:
-    their corners are features too.
+    their corners are features too. `more_frames` are taken where neighbouring pictures share little, and are in the
+    models like the others.
 
     Raises:
         InputError: if a picture is missing, or fewer than three are given.
@@ -86,24 +95,24 @@ def reconstruct(
     shutil.rmtree(work_folder, ignore_errors=True)
     work_folder.mkdir(parents=True)
     pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
-    job = _Job(image_folder, tuple(names), camera, work_folder, options)
-    job.extract(part(report, 0.0, 0.35))
-    if sightings is not None:
-        job.add_corners(sightings, frame_indices)
+    frame_of = dict(zip(names, np.asarray(frame_indices).tolist(), strict=True))
+    job = _Job(image_folder, frame_of, camera, work_folder, options, sightings)
+    job.extract(names, part(report, 0.0, 0.3))
+    if more_frames is not None and options.weak_link > 0:
+        job.bridge(more_frames, part(report, 0.3, 0.4))
     pairs = choose_pairs(*job.descriptors(), options)
-    job.match(pairs, part(report, 0.35, 0.7))
+    job.match(pairs, part(report, 0.4, 0.7))
     models = job.map(part(report, 0.7, 0.9))
-    missing = set(range(len(names))) - job.registered(models)
-    more = {p for p in combinations(range(len(names)), 2) if set(p) & missing} - pairs
+    missing = {position for position in job.missing(models) if job.names[position] in names}
+    more = {p for p in combinations(range(len(job.names)), 2) if set(p) & missing} - pairs
     if more and len(missing) > 0.02 * len(names):
         job.match(more, part(report, 0.9, 0.95))
         again = job.map(part(report, 0.95, 1.0))
         models = max(models, again, key=lambda found: max((len(m) for m in found), default=0))
     if not models:
         raise ReconstructionError(job.failure(len(pairs | more)))
-    index_of = dict(zip(names, np.asarray(frame_indices).tolist(), strict=True))
-    report(1.0, f"{len(models[0])} of {len(names)} frames registered")
-    return [_in_order_of_frames(m, np.array([index_of[name] for name in m.image_names])) for m in models]
+    report(1.0, f"{len(models[0])} of {len(job.names)} frames registered")
+    return [_in_order_of_frames(m, np.array([job.frame_of[name] for name in m.image_names])) for m in models]
 
 
 def _in_order_of_frames(model: SfmModel, frame_indices: Ints) -> SfmModel:
@@ -135,12 +144,28 @@ def _check_pictures(folder: Path, names: Sequence[str], frame_indices: Ints) -> 
 class _Job:
     """One database in the work folder, and pycolmap's steps on it."""
 
-    def __init__(self, images: Path, names: tuple[str, ...], camera: Camera, work: Path, options: SfmOptions):
-        self.images, self.names, self.camera, self.work, self.options = images, names, camera, work, options
-        self.database = work / "database.db"
+    def __init__(
+        self,
+        images: Path,
+        frame_of: dict[str, int],
+        camera: Camera,
+        work: Path,
+        options: SfmOptions,
+        sightings: TagSightings | None,
+    ):
+        self.source, self.frame_of, self.camera, self.work, self.options = images, frame_of, camera, work, options
+        self.sightings, self.database, self.images = sightings, work / "database.db", work / "pictures"
+        self.images.mkdir()
+        for name in frame_of:
+            (self.images / name).symlink_to((images / name).absolute())
 
-    def extract(self, report: Report) -> None:
-        """SIFT features of all pictures into the database."""
+    @property
+    def names(self) -> list[str]:
+        """The pictures in the order of their frames."""
+        return sorted(self.frame_of, key=self.frame_of.__getitem__)
+
+    def extract(self, names: Sequence[str], report: Report) -> None:
+        """SIFT features of some pictures into the database, and the corners of tags after them."""
         extraction = pycolmap.FeatureExtractionOptions()
         extraction.use_gpu, extraction.num_threads = False, self.options.threads
         extraction.sift.max_num_features = self.options.max_features
@@ -149,33 +174,66 @@ class _Job:
         reader = pycolmap.ImageReaderOptions()
         reader.camera_model = self.camera.model
         reader.camera_params = ",".join(repr(value) for value in self.camera.params.tolist())
-        for start, names in _in_parts(self.names, _IMAGES_PER_CALL):
-            report(start / len(self.names), f"Features of frame {start} of {len(self.names)}")
+        if self.database.exists():
+            reader.existing_camera_id = 1  # an earlier call made it
+        for start, some in _in_parts(names, _IMAGES_PER_CALL):
+            report(start / len(names), f"Features of frame {start} of {len(names)}")
             pycolmap.extract_features(
                 self.database,
                 self.images,
-                list(names),
+                list(some),
                 camera_mode=pycolmap.CameraMode.SINGLE,
                 reader_options=reader,
                 extraction_options=extraction,
                 device=pycolmap.Device.cpu,
             )
-            reader.existing_camera_id = 1  # the first call made it
+            reader.existing_camera_id = 1
+        if self.sightings is not None:
+            self._add_corners(set(names), self.sightings)
 
-    def add_corners(self, sightings: TagSightings, frame_indices: Ints) -> None:
-        """The corners of tags as further features of the pictures of these frames, after SIFT's."""
+    def _add_corners(self, names: set[str], sightings: TagSightings) -> None:
         database = pycolmap.Database.open(self.database)
         try:
             ids = {image.name: image.image_id for image in database.read_all_images()}
-            found = {i: (database.read_keypoints(i), database.read_descriptors(i)) for i in ids.values()}
-            database.clear_descriptors()
-            for name, frame in zip(self.names, np.asarray(frame_indices).tolist(), strict=True):
-                mine = sightings.frame_index == frame
-                keypoints, descriptors = found[ids[name]]
-                corners = np.vstack([keypoints, corner_keypoints(sightings.corners_px[mine])])
-                database.update_keypoints(ids[name], corners)
-                data = np.vstack([descriptors.data, corner_descriptors(sightings.tag_id[mine])])
+            known = {name: database.read_descriptors(ids[name]) for name in ids}
+            database.clear_descriptors()  # one by one they cannot be replaced
+            for name, descriptors in known.items():
+                data = descriptors.data
+                if name in names:
+                    mine = sightings.frame_index == self.frame_of[name]
+                    places = [database.read_keypoints(ids[name]), corner_keypoints(sightings.corners_px[mine])]
+                    database.update_keypoints(ids[name], np.vstack(places))
+                    data = np.vstack([data, corner_descriptors(sightings.tag_id[mine])])
                 database.write_descriptors(ids[name], pycolmap.FeatureDescriptors(descriptors.type, data))
+        finally:
+            database.close()
+
+    def bridge(self, more_frames: MoreFrames, report: Report) -> None:
+        """Take further frames, with their features, where neighbouring pictures share too little."""
+        names = self.names
+        neighbours = list(pairwise(range(len(names))))
+        self.match(set(neighbours), part(report, 0.0, 0.3))
+        keyframes = np.array([self.frame_of[name] for name in names])
+        matches = np.array(self._verified([(names[a], names[b]) for a, b in neighbours]))
+        chosen = frames_in_gaps(keyframes, matches, more_frames.frame_indices, self.options.weak_link)
+        if len(chosen) == 0:
+            return
+        added = more_frames.write(chosen, self.images)
+        self.frame_of |= dict(zip(added, chosen.tolist(), strict=True))
+        self.extract(added, part(report, 0.3, 1.0))
+
+    def _verified(self, pairs: Sequence[tuple[str, str]]) -> list[int]:
+        """How many matches of each pair of pictures agree on a geometry."""
+        database = pycolmap.Database.open(self.database)
+        try:
+            ids = {image.name: image.image_id for image in database.read_all_images()}
+            found = [(ids[a], ids[b]) for a, b in pairs]
+            return [
+                len(database.read_two_view_geometry(*pair).inlier_matches)
+                if database.exists_two_view_geometry(*pair)
+                else 0
+                for pair in found
+            ]
         finally:
             database.close()
 
@@ -194,11 +252,11 @@ class _Job:
         matching.use_gpu, matching.num_threads = False, self.options.threads
         verification = pycolmap.TwoViewGeometryOptions()
         verification.ransac.random_seed = self.options.seed
-        pairing = pycolmap.ImportedPairingOptions()
+        names, pairing = self.names, pycolmap.ImportedPairingOptions()
         pairing.match_list_path = self.work / "pairs.txt"
         for start, some in _in_parts(sorted(pairs), _PAIRS_PER_CALL):
             report(start / len(pairs), f"Matching pair {start} of {len(pairs)}")
-            pairing.match_list_path.write_text("".join(f"{self.names[a]} {self.names[b]}\n" for a, b in some))
+            pairing.match_list_path.write_text("".join(f"{names[a]} {names[b]}\n" for a, b in some))
             pycolmap.match_image_pairs(
                 self.database,
                 matching_options=matching,
@@ -230,7 +288,7 @@ class _Job:
             )
             if not token.is_cancelled:
                 for key, model in found.items():
-                    polish(model)
+                    polish(model, self.options.least_views)
                     model.write_binary(str(output / str(key)))
             return [output / str(key) for key in found]
 
@@ -252,10 +310,10 @@ class _Job:
         mapping.mapper.abs_pose_min_num_inliers = 20
         return mapping
 
-    def registered(self, models: list[SfmModel]) -> set[int]:
-        """Positions in `names` of the pictures of the largest model."""
+    def missing(self, models: list[SfmModel]) -> set[int]:
+        """Positions in `names` of the pictures that the largest model lacks."""
         names = set(models[0].image_names) if models else set()
-        return {position for position, name in enumerate(self.names) if name in names}
+        return {position for position, name in enumerate(self.names) if name not in names}
 
     def failure(self, tried: int) -> str:
         """The sentence for when no model came out."""
@@ -266,7 +324,7 @@ class _Job:
         finally:
             database.close()
         return (
-            f"{self.images}: no reconstruction came out of {len(self.names)} frames (median of {features} features per "
+            f"{self.source}: no reconstruction came out of {len(self.names)} frames (median of {features} features per "
             f"frame, {tried} pairs matched, {agree} of them agree); record with more light, slower turns and steps to "
             "the side, and put more texture or tags into the room."
         )

@@ -18,15 +18,22 @@ LOSS_PX = 1.0
 """Errors beyond this count ever less (Cauchy): false matches of dim frames must not weigh with their squares."""
 MOST_PX = 8.0
 """Points that are off by more than this after that are no points."""
-LEAST_VIEWS = 3
 LEAST_OBSERVATIONS = 30
 """A frame with fewer of these observations keeps its points of two views: better weak than loose."""
 
 
-def polish(model: Any) -> None:
-    """Adjust cameras and points of a `pycolmap.Reconstruction` in place; its intrinsics stay."""
+def polish(model: Any, least_views: int) -> None:
+    """Adjust cameras and points of a `pycolmap.Reconstruction` in place; its intrinsics stay.
+
+    Points that fewer than `least_views` frames show do not move cameras, where there are others.
+    """
+    weak = _weak_points(model, least_views)
+    if not weak:
+        _adjust(model, poses=True)
+        model.update_point_3d_errors()
+        return
     strong = copy.deepcopy(model)
-    for point_id in _weak_points(model):
+    for point_id in weak:
         strong.delete_point3D(point_id)
     _adjust(strong, poses=True)
     for frame_id in strong.reg_frame_ids():
@@ -37,17 +44,17 @@ def polish(model: Any) -> None:
         model.delete_point3D(point_id)
 
 
-def _weak_points(model: Any) -> list[int]:
+def _weak_points(model: Any, least_views: int) -> list[int]:
     """The points of too few views, but those of frames that have little else."""
     views = {key: [element.image_id for element in point.track.elements] for key, point in model.points3D.items()}
     strong: Counter[int] = Counter()
     for images in views.values():
-        if len(images) >= LEAST_VIEWS:
+        if len(images) >= least_views:
             strong.update(images)
     return [
         key
         for key, images in views.items()
-        if len(images) < LEAST_VIEWS and all(strong[image] >= LEAST_OBSERVATIONS for image in images)
+        if len(images) < least_views and all(strong[image] >= LEAST_OBSERVATIONS for image in images)
     ]
 
 

@@ -39,7 +39,7 @@ def write_model(recording_folder: Path, folder: Path, stride: int, seed: int, re
         for name, (_, rgb) in zip(names, recording.frames.iterate(indices), strict=True):
             picture = undistorter.image(rgb)[..., ::-1]
             cv2.imwrite(str(images / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 95])
-        options = SfmOptions(max_features=MAX_FEATURES, threads=1, seed=seed)
+        options = SfmOptions(max_features=MAX_FEATURES, threads=1, seed=seed, least_views=2)  # as it was committed
         reconstruct(images, names, undistorter.target, np.array(indices), work, options, part(report, 0.1, 1.0))
         found = [pycolmap.Reconstruction(p) for p in sorted((work / "models").iterdir())]
     folder.mkdir(parents=True, exist_ok=True)

@@ -19,6 +19,7 @@ from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.recording import Recording
 from gazeloc_core.sfm import SfmOptions, reconstruct
+from gazeloc_core.sfm_bridges import MoreFrames, spaced
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.scan import tag_entry
@@ -28,6 +29,8 @@ from gazeloc_core.undistort import Undistorter, UndistortOptions
 from gazeloc_core.user_files import about
 
 JPEG_QUALITY = 95
+BRIDGES_HZ = 15.0
+"""Where neighbouring keyframes share little, up to this many frames per second are reconstructed."""
 
 
 def find_keyframes(
@@ -85,13 +88,8 @@ def undistort(
 
     def make(folder: Path) -> None:
         write_json_atomically(folder / "camera.json", undistorter.target.to_json())
-        images = folder / "images"
-        images.mkdir()
-        for done, (index, rgb) in enumerate(opened.frames.iterate(keyframes.tolist())):
-            report(done / len(keyframes), f"undistorting frame {index}")
-            bgr = cv2.cvtColor(undistorter.image(rgb), cv2.COLOR_RGB2BGR)
-            if not cv2.imwrite(str(images / image_name(index)), bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]):
-                raise InputError.of(images, "a frame could not be written", "check the free space on the disk")
+        (folder / "images").mkdir()
+        _write_pictures(opened, undistorter, keyframes, folder / "images", report)
 
     project.artifact(recording, "undistorted").write(
         make,
@@ -99,6 +97,18 @@ def undistort(
         inputs=undistort_inputs(project, recording),
         stats={"images": len(keyframes)},
     )
+
+
+def _write_pictures(
+    recording: Recording, undistorter: Undistorter, frames: Ints, folder: Path, report: Report = silent
+) -> list[str]:
+    """Write some frames as a pinhole camera sees them; their names, in order."""
+    for done, (index, rgb) in enumerate(recording.frames.iterate(frames.tolist())):
+        report(done / len(frames), f"undistorting frame {index}")
+        bgr = cv2.cvtColor(undistorter.image(rgb), cv2.COLOR_RGB2BGR)
+        if not cv2.imwrite(str(folder / image_name(index)), bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]):
+            raise InputError.of(folder, "a frame could not be written", "check the free space on the disk")
+    return [image_name(index) for index in frames.tolist()]
 
 
 def undistort_inputs(project: Project, recording: str) -> dict[str, str]:
@@ -191,17 +201,23 @@ def _import_model(project: Project, recording: str) -> list[SfmModel]:
 
 
 def _reconstruct(project: Project, recording: str, options: SfmOptions, work: Path, report: Report) -> list[SfmModel]:
-    keyframes = load_keyframes(project, recording)
+    opened, keyframes = inputs.load_recording(project, recording), load_keyframes(project, recording)
+    camera = inputs.load_undistorted_camera(project, recording)
+    undistorter = Undistorter(opened.camera, camera)
     has_tags = project.settings.tags is not None
     return reconstruct(
         project.artifact(recording, "undistorted").folder / "images",
         [image_name(index) for index in keyframes.tolist()],
-        inputs.load_undistorted_camera(project, recording),
+        camera,
         keyframes,
         work,
         options,
         report,
         sightings=inputs.load_sightings(project.artifact(recording, "tags").read_arrays()) if has_tags else None,
+        more_frames=MoreFrames(
+            spaced(opened.timestamp_ns, BRIDGES_HZ),
+            lambda frames, folder: _write_pictures(opened, undistorter, frames, folder),
+        ),
     )
 
 
