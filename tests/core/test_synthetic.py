@@ -17,9 +17,19 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.synthesis import glasses, paths, tags, truth
+from gazeloc_core.synthesis.hardness import blur_px, hardness, turn_deg_per_s
 from gazeloc_core.synthesis.packing import packed
-from gazeloc_core.synthesis.room import subpixels
-from gazeloc_core.synthetic import PRESETS, render, scene_room, write_scene
+from gazeloc_core.synthesis.room import X, Z, subpixels
+from gazeloc_core.synthesis.routes import ROUTES
+from gazeloc_core.synthetic import (
+    PRESETS,
+    read_options,
+    recording_name,
+    render,
+    scene_room,
+    truth_name,
+    write_scene,
+)
 
 TINY = PRESETS["tiny"]
 CORNER_BIAS_PX = 0.7
@@ -83,6 +93,73 @@ def test_the_head_turns_at_an_easy_pace():
     walked = np.linalg.norm(np.diff(poses.translation, axis=0), axis=1) * 30
     assert turned.max() < 130
     assert walked.max() < 1.5
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_a_wearer_in_a_hurry_takes_the_same_way_faster(route):
+    calm, quick = paths.head_path(3, route), paths.head_path(3, route, 1.5)
+    seconds = np.arange(0, 14, 1 / 30)
+    assert np.allclose(quick.poses(seconds).as_matrix(), calm.poses(seconds * 1.5).as_matrix())
+    turned = np.degrees((calm.poses(seconds).rotation.inv() * calm.poses(seconds + 0.01).rotation).magnitude()) * 100
+    assert turned.max() < 140
+    eyes = calm.poses(seconds).translation
+    assert (np.abs(eyes[:, [0, 2]]) < [X - 0.5, Z - 0.5]).all()
+    assert np.linalg.norm(np.diff(eyes, axis=0), axis=1).max() * 30 < 1.5
+
+
+def test_a_second_route_shares_the_scan(tmp_path: Path):
+    small = replace(TINY, phone_frames=6, phone_seconds=6.0, glasses_seconds=0.2, exact_room=False)
+    both = replace(small, routes=("first", "second"), hurry=1.2)
+    write_scene(tmp_path, both)
+    assert read_options(tmp_path) == both
+    recordings = [open_recording(tmp_path / recording_name(route)) for route in both.routes]
+    starts = []
+    for route, recording in zip(both.routes, recordings, strict=True):
+        rows = tum_rows(tmp_path / truth_name(route))
+        assert [row[0] for row in rows] == [truth.seconds_text(t) for t in recording.timestamp_ns.tolist()]
+        starts.append(poses_of(rows).translation[0])
+        assert (
+            tmp_path / "truth" / truth_name(route).replace("truth/glasses", "gaze3d").replace("tum", "csv")
+        ).is_file()
+    assert np.linalg.norm(starts[0] - starts[1]) > 1
+    facts = hardness(tmp_path, both, "second")
+    assert 5 < facts.mean_grey < 200
+    assert facts.blur_p90_px > 0
+
+
+def test_what_was_written_before_there_were_routes_is_described_as_then(scene: Path):
+    options = json.loads((scene / "scene.json").read_text())["options"]
+    assert {"routes", "hurry"}.isdisjoint(options)
+    assert read_options(scene) == TINY
+
+
+def test_table_two_has_two_settings_of_markers_each_plain_and_hard():
+    scenes = {name: options for name, options in PRESETS.items() if name.startswith("table2-")}
+    assert set(scenes) == {f"table2-{setting}-{kind}" for setting in "ab" for kind in ("plain", "hard")}
+    assert all(options.routes == ("first", "second") for options in scenes.values())
+    for setting in "ab":
+        plain, hard = scenes[f"table2-{setting}-plain"], scenes[f"table2-{setting}-hard"]
+        assert set(hard.tag_ids) < set(plain.tag_ids)
+        assert (len(hard.tag_ids), hard.bare, hard.tag_size_m) == (5, True, plain.tag_size_m)
+        assert hard.hurry > plain.hurry
+        assert hard.glasses_gain < plain.glasses_gain
+    assert set(scenes["table2-a-plain"].tag_ids).isdisjoint(scenes["table2-b-plain"].tag_ids)
+
+
+def test_blur_by_the_exact_path_is_the_exposure_times_the_speed_of_the_picture(room):
+    capture = glasses.GlassesCapture(
+        glasses.lens((272, 270)),
+        glasses.START_NS + np.arange(20) * 100_000_000,
+        paths.head_path(5),
+        scene_transform(),
+        0.01,
+    )
+    caster = Raycaster(room.mesh)
+    blur = blur_px(capture, caster)
+    assert np.allclose(blur_px(replace(capture, exposure_s=0.02), caster), 2 * blur, rtol=0.05, atol=0.02)
+    turning = np.radians(turn_deg_per_s(capture)) * capture.camera.focal_px.mean() * capture.exposure_s
+    fast = turning > np.median(turning)
+    assert np.median(blur[fast] / turning[fast]) == pytest.approx(1, abs=0.35)  # walking adds, the edges stretch
 
 
 def test_phone_times_are_those_of_the_truth_to_the_last_digit(scene: Path):
