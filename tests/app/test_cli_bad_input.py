@@ -14,7 +14,10 @@ from fake_project import CLICKED, click, contents
 from gazeloc_app.cli import main
 
 from gazeloc_core.methods import Method
+from gazeloc_core.pipeline import run_stage, stage_named
 from gazeloc_core.project import Project
+from gazeloc_core.stages import inputs
+from gazeloc_core.stages.recording import reconstruction_inputs
 
 Prepare = Callable[[Path], list[Any]]
 CASES: list[Any] = []
@@ -308,12 +311,18 @@ def tagged(size_m: Any) -> Callable[[Path], Any]:
     )
 
 
-add(
-    "no tag found",
-    r"walk: no tag of .* tag36h11 .* show none.*; click",
-    "run @project",
-    tagged(0.16),
-)
+@case("no tag found", r"walk: no tag of .* tag36h11 .* show none.*; click")
+def _(home: Path) -> list[Any]:
+    tagged(0.16)(home)
+    project = Project.open(home / "project")
+    run_stage(project, stage_named("tags"), "walk")
+    model = inputs.load_model(project, "walk")  # as it would be reconstructed of these frames without a tag
+    project.artifact("walk", "reconstruction").write_arrays(
+        inputs.model_arrays([model]), options={}, inputs=reconstruction_inputs(project, "walk")
+    )
+    return ["run", home / "project"]
+
+
 add("project with a word for a tag size", r"project\.json: .*damaged .*'big'", "status @project", tagged("big"))
 add(
     "recording whose name leads elsewhere",
