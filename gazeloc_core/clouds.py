@@ -19,6 +19,8 @@ from gazeloc_core.transforms import Similarity
 NORMAL_NEIGHBOURS = 30
 FEATURE_NEIGHBOURS = 100
 """Most neighbours within the radius that a normal and a feature are made of, as in Open3D's own examples."""
+LEAST_SCALE = 0.01
+"""Clouds of about one size that are registered with a smaller scale than this have collapsed, not been registered."""
 
 
 @dataclass(frozen=True)
@@ -128,4 +130,6 @@ def _registered(answer: Any) -> Registered | None:
     if answer.fitness <= 0:
         return None
     matrix = np.asarray(answer.transformation, dtype=np.float64)
+    if np.cbrt(np.linalg.det(matrix[:3, :3])) < LEAST_SCALE:
+        return None  # with a free scale all points may be drawn onto one of the other cloud, which "fits"
     return Registered(Similarity.from_matrix(matrix, "registration"), float(answer.fitness), float(answer.inlier_rmse))
