@@ -97,6 +97,6 @@ def _summary(rows: list[Row]) -> str:
     return (
         "Two surfaces of the sparse points registered to the scan by shape alone (section VI-A). Mean camera errors "
         f"after the paper's ICP: with the scale estimated {last('scale estimated', 'icp')}, with the scale given "
-        f"{last('scale given', 'icp')}. A further ICP that may change the scale, which the paper does not have, ends at "
-        f"{last('scale estimated', 'icp with scale')}. `scale_against_sfm` is 1 where the scale is right."
+        f"{last('scale given', 'icp')}. A further ICP that may change the scale, which the paper does not have, ends "
+        f"at {last('scale estimated', 'icp with scale')}. `scale_against_sfm` is 1 where the scale is right."
     )

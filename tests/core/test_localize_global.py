@@ -1,12 +1,14 @@
 """Method `global`: shapes alone give the similarity, on made-up rooms and on a real pair of clouds."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
 from data import SHARED, needs_shared
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.clouds import icp_point_to_point, sample_surface
+from gazeloc_core.clouds import _registered, icp_point_to_point, sample_surface
 from gazeloc_core.errors import Cancelled, GeometryError, InputError
 from gazeloc_core.localize.global_ import GlobalOptions, align_global, register_global
 from gazeloc_core.scan import Mesh
@@ -207,3 +209,9 @@ def test_icp_leaves_out_what_is_too_far_and_says_how_much():
     assert found.fitness == pytest.approx(0.75)
     np.testing.assert_allclose(found.a_from_b.translation, (-0.01, 0, 0), atol=1e-6)
     assert icp_point_to_point(source + 100, target, Similarity.identity(), within=0.03) is None
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.005, -1.0])
+def test_a_cloud_that_collapsed_onto_a_point_or_was_mirrored_is_no_answer(scale):
+    matrix = np.diag([scale, scale, scale, 1.0])
+    assert _registered(SimpleNamespace(fitness=0.9, inlier_rmse=0.001, transformation=matrix)) is None
