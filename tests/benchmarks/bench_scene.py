@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bench_alignment import bench_icp, bench_keypoints, of_project
+from bench_alignment import scene as scene_case
 
 from gazeloc_core import pipeline
 from gazeloc_core.project import Project
@@ -40,7 +41,12 @@ def bench_scene(scene: Path, work: Path) -> list[Row]:
     stages = [
         (f"    {time.title}", f"{time.seconds:.1f} s, {100 * time.seconds / total:.0f} %", True) for time in times
     ]
-    return rows + stages + _alignment_rows(project)
+    return rows + stages + _alignment_rows(project) + _shipped_rows(scene)
+
+
+def _shipped_rows(scene: Path) -> list[Row]:
+    """Clicked pairs on the plain COLMAP model that the scene brings along, which is less exact than our own."""
+    return [(f"on the scene's COLMAP model: {what}", text, ok) for what, text, ok in bench_keypoints(scene_case(scene))]
 
 
 def _alignment_rows(project: Project) -> list[Row]:
