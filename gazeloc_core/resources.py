@@ -25,6 +25,18 @@ def static_file(name: str) -> Path:
     return path
 
 
+def static_files(folder: str) -> list[Path]:
+    """The files of a folder in static/, in the order of their names.
+
+    Raises:
+        InputError: if there is no such folder, or the name leads out of static/.
+    """
+    path = _find("static", folder)
+    if not path.is_dir():
+        raise InputError(f"GazeLoc has no folder static/{folder}; install it again.")
+    return sorted(file for file in path.iterdir() if file.is_file())
+
+
 def sample_scene(name: str) -> Path:
     """The folder of a sample scene, e.g. "studio".
 

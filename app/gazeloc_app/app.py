@@ -18,7 +18,10 @@ import numpy as np
 import viser
 
 from gazeloc_app import tasks
-from gazeloc_app.actions import JobEnded, NameRenderer, Notify, OpenRecording, ShowFrame, StartJob
+from gazeloc_app.actions.action import Notify
+from gazeloc_app.actions.choices import OpenRecording
+from gazeloc_app.actions.jobs import JobEnded, StartJob
+from gazeloc_app.actions.views import NameRenderer, ShowFrame
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.jobs import JobRunner

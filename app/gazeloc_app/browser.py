@@ -12,7 +12,9 @@ import viser
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app import picking, widgets
-from gazeloc_app.actions import Action, Notify, PickPoint, PickSighting, ShowFrame, Side
+from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
+from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.data import ProjectData
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.render_process import RenderProcess

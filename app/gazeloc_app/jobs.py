@@ -21,7 +21,8 @@ from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
-from gazeloc_app.actions import Action, JobCancelling, JobEnded, JobProgressed
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.jobs import JobCancelling, JobEnded, JobProgressed
 from gazeloc_app.state import Level
 from gazeloc_core.errors import Cancelled, GazelocError
 from gazeloc_core.progress import Report

@@ -26,6 +26,7 @@ from websockets.http11 import Request, Response
 
 from gazeloc_app.gui_values import is_offered
 from gazeloc_app.loopback import check_loopback
+from gazeloc_app.page import dress
 from gazeloc_app.routes import Reply, Routes
 from gazeloc_core.errors import InputError
 
@@ -34,13 +35,6 @@ MAX_MESSAGE_BYTES = 4 * 1024 * 1024
 _OPEN_TIMEOUT_S = 60
 """The handshake's limit covers our routes, and the first render waits for the mesh to load."""
 _LOOPBACK_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:[0-9]{1,5})?", re.IGNORECASE)
-_TRUE_COLORS = """
-(function hook() {
-  const scene = window.__viserMutable && window.__viserMutable.scene;
-  if (!scene) { setTimeout(hook, 50); return; }
-  scene.onBeforeRender = (renderer) => { renderer.toneMapping = 0; };
-})();
-"""
 _constructing = threading.Lock()
 
 Check = Callable[[Request], str | None]
@@ -65,7 +59,10 @@ def make_server(
     """
     listener = _listen(host, port)
     try:
-        with _serving_through(listener, routes, (own_page_only, *checks)), contextlib.redirect_stdout(io.StringIO()):
+        with (
+            _serving_through(listener, routes, (own_page_only, *checks), title),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
             server = viser.ViserServer(host=host, port=listener.getsockname()[1], label=title, verbose=False)
     except BaseException:
         listener.close()
@@ -75,14 +72,15 @@ def make_server(
     server.gui.configure_theme(
         dark_mode=dark_mode, show_logo=False, show_share_button=False, brand_color=(28, 110, 140)
     )
-    _run_in_page(server, f"document.title = {title!r};")
-    set_true_colors(server)
+    _set_even_light(server)
     return server
 
 
-def set_true_colors(server: viser.ViserServer) -> None:
-    """Show unlit meshes exactly as stored: no tone mapping, lights, shadows or environment. Markers get even light."""
-    _run_in_page(server, _TRUE_COLORS)
+def _set_even_light(server: viser.ViserServer) -> None:
+    """No lights, shadows or environment that would tint a scan; markers, which are not unlit, get it from all sides.
+
+    static/page/true-colors.js is the other half: no tone mapping.
+    """
     server.scene.configure_default_lights(False, cast_shadow=False)
     server.scene.configure_environment_map(None)
     server.scene.add_light_ambient("/light", intensity=3.0)
@@ -132,13 +130,13 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 @contextlib.contextmanager
-def _serving_through(listener: socket.socket, routes: Routes, checks: Sequence[Check]) -> Iterator[None]:
+def _serving_through(listener: socket.socket, routes: Routes, checks: Sequence[Check], title: str) -> Iterator[None]:
     """While this is open, the server that viser starts listens on `listener` and asks `checks` and `routes` first."""
     plain_serve = websockets.asyncio.server.serve
 
     def serve(handler: Any, _host: Any, _port: Any, *, process_request: Any, **options: Any) -> Any:
         options |= {"max_size": MAX_MESSAGE_BYTES, "open_timeout": _OPEN_TIMEOUT_S}
-        answer = _request_handler(process_request, routes, checks)
+        answer = _request_handler(process_request, routes, checks, title)
         return plain_serve(handler, sock=listener, process_request=answer, **options)
 
     with _constructing:
@@ -149,7 +147,7 @@ def _serving_through(listener: socket.socket, routes: Routes, checks: Sequence[C
             websockets.asyncio.server.serve = plain_serve  # type: ignore[misc]
 
 
-def _request_handler(viser_answer: Any, routes: Routes, checks: Sequence[Check]) -> Any:
+def _request_handler(viser_answer: Any, routes: Routes, checks: Sequence[Check], title: str) -> Any:
     async def answer(connection: Any, request: Request) -> Response | None:
         refusal = next((sentence for check in checks if (sentence := check(request))), None)
         if refusal is not None:
@@ -161,6 +159,7 @@ def _request_handler(viser_answer: Any, routes: Routes, checks: Sequence[Check])
         if reply is not None:
             return _response(reply)
         page: Response = viser_answer(connection, request)
+        dress(page, request.path, title)
         page.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
         return page
 
@@ -200,8 +199,3 @@ def _accept_values_only() -> None:
 
     guarded.is_guarded = True  # type: ignore[attr-defined]
     _gui_api.GuiApi._handle_gui_updates = guarded  # type: ignore[method-assign]
-
-
-def _run_in_page(server: viser.ViserServer, javascript: str) -> None:
-    """Run in every page, now and when it connects; kept also in an exported scene."""
-    server._websock_server.queue_message(_messages.RunJavascriptMessage(source=javascript))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_app.actions import Side
+from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import AppState

@@ -1,4 +1,4 @@
-"""What the app knows, in one frozen value: every view renders from it, and only actions (actions.py) change it.
+"""What the app knows, in one frozen value: every view renders from it, and only actions (actions/) change it.
 
 Not in here: what belongs to one browser (its camera, its pick mode), which stays on the client's handle; and what the
 stages made (meshes, points, trajectories), which is read from the project by `data.py` and named here by revision.

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 
-from gazeloc_app.actions import Action
+from gazeloc_app.actions.action import Action
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.errors import GazelocError
 

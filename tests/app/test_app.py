@@ -12,19 +12,12 @@ import pytest
 from app_project import SFM_FROM_SCAN, make_app_project, true_poses
 from app_steps import step, stop, wait_for_job
 from gazeloc_app import tasks
-from gazeloc_app.actions import (
-    ChooseAlignment,
-    JobEnded,
-    PickPoint,
-    PickSighting,
-    Redo,
-    SelectPair,
-    ShowFrame,
-    ShowLayer,
-    Side,
-    StartJob,
-    Undo,
-)
+from gazeloc_app.actions.choices import ChooseAlignment
+from gazeloc_app.actions.history import Redo, Undo
+from gazeloc_app.actions.jobs import JobEnded, StartJob
+from gazeloc_app.actions.pairs import SelectPair
+from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
+from gazeloc_app.actions.views import ShowFrame, ShowLayer
 from gazeloc_app.app import App
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess, Superseded

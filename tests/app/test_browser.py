@@ -9,7 +9,8 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from gazeloc_app.actions import PickPoint, ShowLayer, Side
+from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.actions.views import ShowLayer
 from gazeloc_app.browser import Browser, PickMode
 from gazeloc_app.render_worker import Photo
 from gazeloc_app.scene.frames import PLANE_M

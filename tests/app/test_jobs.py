@@ -12,7 +12,8 @@ from typing import Any
 import job_tasks
 import pytest
 from gazeloc_app import jobs
-from gazeloc_app.actions import Action, JobCancelling, JobEnded, JobProgressed
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.jobs import JobCancelling, JobEnded, JobProgressed
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.state import Level
 

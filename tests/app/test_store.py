@@ -4,20 +4,11 @@ import threading
 from dataclasses import dataclass, replace
 
 import pytest
-from gazeloc_app.actions import (
-    ChooseAlignment,
-    DeletePair,
-    EnablePair,
-    JobEnded,
-    PickPoint,
-    PickSighting,
-    Redo,
-    RenamePair,
-    SelectPair,
-    Side,
-    StartJob,
-    Undo,
-)
+from gazeloc_app.actions.choices import ChooseAlignment
+from gazeloc_app.actions.history import Redo, Undo
+from gazeloc_app.actions.jobs import JobEnded, StartJob
+from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair, SelectPair
+from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.state import AppState, Layer, LayerSettings, Level
 from gazeloc_app.store import Store
 from hypothesis import given

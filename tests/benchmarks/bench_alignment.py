@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from box_room import make_room, perturbed
-from gazeloc_app.actions import PickPoint, Side
+from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.state import AppState
 
 from gazeloc_core.alignment import Alignment, align, judge

@@ -17,7 +17,7 @@ import numpy as np
 from app_project import make_app_project
 from data import CHECKOUT, SAMPLE_SCENES
 from e2e.page import ViewerPage, chromium_path, launch
-from gazeloc_app.actions import Undo
+from gazeloc_app.actions.history import Undo
 from gazeloc_app.app import App
 from gazeloc_app.browser import PickMode
 from gazeloc_app.demo import demo_project

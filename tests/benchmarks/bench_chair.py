@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from chair_places import Place, find_places
-from gazeloc_app.actions import PickPoint, PickSighting, SelectPair, Side
+from gazeloc_app.actions.pairs import SelectPair
+from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.sightings import triangulated
 from gazeloc_app.state import AppState

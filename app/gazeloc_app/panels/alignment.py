@@ -8,7 +8,9 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
-from gazeloc_app.actions import Action, ChooseAlignment, Notify, StartJob
+from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.choices import ChooseAlignment
+from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.alignment import Alignment

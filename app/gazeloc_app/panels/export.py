@@ -8,7 +8,8 @@ from pathlib import Path
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
-from gazeloc_app.actions import Action, Notify, StartJob
+from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState, Level
 

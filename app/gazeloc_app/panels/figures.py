@@ -8,7 +8,8 @@ import plotly.graph_objects as go
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
-from gazeloc_app.actions import Action, StartJob
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState

@@ -14,7 +14,8 @@ import numpy as np
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.actions import Action, DrawTags, ShowFrame
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.views import DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
 from gazeloc_app.gaze_at import gaze_in_frame
 from gazeloc_app.sightings import image_of_frame

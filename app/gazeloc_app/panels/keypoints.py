@@ -7,7 +7,9 @@ from collections.abc import Callable
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.actions import Action, DeletePair, EnablePair, Redo, RenamePair, SelectPair, Undo
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.history import Redo, Undo
+from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair, SelectPair
 from gazeloc_app.data import ProjectData
 from gazeloc_app.residuals import PairResidual, pair_residuals
 from gazeloc_app.state import AppState

@@ -9,7 +9,8 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.actions import Action, ShowLayer, TintLayer
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.views import ShowLayer, TintLayer
 from gazeloc_app.state import AppState, Layer, LayerSettings
 
 HINTS = {

@@ -11,7 +11,9 @@ import numpy as np
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
-from gazeloc_app.actions import Action, ChooseMethod, CompareMethod, StartJob
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
+from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.scene_view import METHOD_COLORS, RED
 from gazeloc_app.state import AppState

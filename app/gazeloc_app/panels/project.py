@@ -7,7 +7,8 @@ from collections.abc import Callable
 from viser import GuiApi
 
 from gazeloc_app import tasks, widgets
-from gazeloc_app.actions import Action, StartJob
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.state import AppState
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State

@@ -1,0 +1,65 @@
+"""Which recording, alignment and method people work with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from gazeloc_app.state import Annotation, AppState, Level
+from gazeloc_core.methods import Method
+
+
+@dataclass(frozen=True)
+class ChooseAlignment:
+    """A person put an alignment in force, or none."""
+
+    key: str | None
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return state.annotate(replace(state.annotation, alignment=self.key, alignment_by_person=self.key is not None))
+
+
+@dataclass(frozen=True)
+class ChooseMethod:
+    """A person wants to see and export another method's poses."""
+
+    method: Method
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return state.annotate(replace(state.annotation, method=self.method))
+
+
+@dataclass(frozen=True)
+class CompareMethod:
+    """A method's poses shall show beside those of the chosen one, or not."""
+
+    method: Method
+    is_shown: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        compared = state.compared | {self.method} if self.is_shown else state.compared - {self.method}
+        return replace(state, compared=compared)
+
+
+@dataclass(frozen=True)
+class OpenRecording:
+    """Another recording was opened, with what people decided about it so far."""
+
+    recording: str
+    annotation: Annotation
+
+    def apply(self, state: AppState) -> AppState:
+        """The state of the other recording, its undo list empty; refused while a job is about the one that is open."""
+        if state.job is not None:
+            return state.noticed(Level.WARNING, f"“{state.job.name}” is still running; wait for it or cancel it.")
+        return replace(
+            AppState(state.recordings, self.recording, self.annotation),
+            layers=state.layers,
+            compared=state.compared,
+            draws_tags=state.draws_tags,
+            data_revision=state.data_revision + 1,
+            renderer_note=state.renderer_note,
+            jobs_started=state.jobs_started,
+        )

@@ -1,0 +1,64 @@
+"""What is shown, in every browser alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from gazeloc_app.state import AppState, Layer
+
+
+@dataclass(frozen=True)
+class ShowFrame:
+    """A frame of the recording was chosen."""
+
+    frame: int
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the frame."""
+        return replace(state, frame=max(0, self.frame))
+
+
+@dataclass(frozen=True)
+class DrawTags:
+    """The tags that were found shall be drawn into the frame, or not."""
+
+    is_on: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return replace(state, draws_tags=self.is_on)
+
+
+@dataclass(frozen=True)
+class ShowLayer:
+    """A layer was switched on or off."""
+
+    layer: Layer
+    is_visible: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the layer switched."""
+        return replace(state, layers=state.layers.with_visible(self.layer, self.is_visible))
+
+
+@dataclass(frozen=True)
+class TintLayer:
+    """A layer was tinted, or got its own colours back."""
+
+    layer: Layer
+    tint: tuple[int, int, int] | None
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the tint."""
+        return replace(state, layers=state.layers.with_tint(self.layer, self.tint))
+
+
+@dataclass(frozen=True)
+class NameRenderer:
+    """The renderer of pictures is known; `note` is the sentence to show where it stands in for the usual one."""
+
+    note: str
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the sentence."""
+        return replace(state, renderer_note=self.note)
