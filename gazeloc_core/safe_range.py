@@ -27,6 +27,8 @@ from gazeloc_core.transforms import rotation_angle_rad
 _SIZE_M = 0.16  # any: all is counted in tag sizes
 _PICTURE_PX = 1300
 _ASIDE_DEG = 12.0
+TRIALS_VERSION = 1
+"""Goes up whenever the same options give other numbers, so that what was kept of before is not taken for them."""
 
 
 @dataclass(frozen=True, kw_only=True)

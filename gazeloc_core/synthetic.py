@@ -28,7 +28,7 @@ from gazeloc_core.synthesis.fusion import fused
 from gazeloc_core.synthesis.gaze import looked
 from gazeloc_core.synthesis.glasses import GlassesCapture
 from gazeloc_core.synthesis.room import SCAN_FROM_ROOM, Room, build_room, render
-from gazeloc_core.synthesis.routes import RouteName
+from gazeloc_core.synthesis.routes import ROUTES, RouteName
 from gazeloc_core.synthesis.tags import FAMILY
 from gazeloc_core.synthesis.texturing import textured, write_obj
 from gazeloc_core.synthetic_model import write_model
@@ -74,10 +74,10 @@ class SceneOptions:
     """Size of the texture's texels on the mesh, in metres."""
     routes: tuple[RouteName, ...] = ("first",)
     """The routes of the wearer, one recording each."""
-    hurry: float = 1.0
-    """How many times as fast as at ease the wearer walks and turns the head."""
+    hurry: tuple[float, ...] = (1.0,)
+    """How many times as fast as at ease the wearer walks and turns the head, by route; the last goes for the rest."""
     glasses_seconds: float = 21.0
-    """Length of each recording in seconds (22 at most, divided by `hurry`: then the walk ends)."""
+    """Length of each recording in seconds; a hurried walk ends sooner (`WALK_SECONDS`)."""
     glasses_hz: float = 30.0
     """Mean frame rate of the scene video."""
     glasses_size_px: tuple[int, int] = glasses.SIZE
@@ -99,6 +99,10 @@ _LATER = ("routes", "hurry")
 
 _TABLE2 = SceneOptions(routes=("first", "second"), glasses_seconds=20.0, glasses_hz=12.0, model_stride=0)
 """Two recordings in one scan; a frame rate that is made in minutes and still gives every keyframe a choice of six."""
+WALK_SECONDS = 21.8
+"""How long the routes take at ease."""
+HARD_HURRY = (1.2, 1.5)
+"""The second route turns less, so its wearer hurries more."""
 _SETTING_A = replace(_TABLE2, seed=11)
 _SETTING_B = replace(_TABLE2, seed=12, tag_ids=(10, 11, 12, 13, 14, 15, 16, 17), tag_size_m=0.20)
 
@@ -109,7 +113,7 @@ def _hard(options: SceneOptions, tag_ids: tuple[int, ...]) -> SceneOptions:
         options,
         tag_ids=tag_ids,
         bare=True,
-        hurry=1.2,
+        hurry=HARD_HURRY,
         glasses_seconds=17.0,
         glasses_gain=0.22,
         video_crf=25,
@@ -194,11 +198,15 @@ def _suffix(route: RouteName) -> str:
 
 def glasses_capture(route: RouteName, options: SceneOptions) -> GlassesCapture:
     """A route's recording before anything is drawn: its lens, times and exact path."""
-    seed = _seed(route, options)
-    times = glasses.frame_times(options.glasses_seconds, options.glasses_hz, seed + 30)
-    path = paths.head_path(seed + 40, route, options.hurry)
+    seed, hurry = _seed(route, options), _hurry(route, options)
+    times = glasses.frame_times(min(options.glasses_seconds, WALK_SECONDS / hurry), options.glasses_hz, seed + 30)
+    path = paths.head_path(seed + 40, route, hurry)
     lens = glasses.lens(options.glasses_size_px)
     return GlassesCapture(lens, times, path, SCAN_FROM_ROOM, options.glasses_exposure_s)
+
+
+def _hurry(route: RouteName, options: SceneOptions) -> float:
+    return options.hurry[min(tuple(ROUTES).index(route), len(options.hurry) - 1)]
 
 
 def _seed(route: RouteName, options: SceneOptions) -> int:

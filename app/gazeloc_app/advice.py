@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from gazeloc_app.terminal import progress_bar, table
-from gazeloc_core.safe_range import SafeRangeOptions, tag_quality, try_tags
+from gazeloc_core.remembered_quality import remembered_quality
+from gazeloc_core.safe_range import SafeRangeOptions
 from gazeloc_core.tag_advice import RoomOptions, room_map
+from gazeloc_core.user_cache import user_cache
 
 
 def advise(*, width_m: float, length_m: float, focal_px: float, view_deg: float, quick: bool) -> None:
@@ -12,7 +14,7 @@ def advise(*, width_m: float, length_m: float, focal_px: float, view_deg: float,
     room = RoomOptions(width_m=width_m, length_m=length_m, focal_px=focal_px, view_deg=view_deg)
     options = SafeRangeOptions(focal_px=focal_px) if not quick else SafeRangeOptions(focal_px=focal_px, repeats=3)
     with progress_bar() as report:
-        quality = tag_quality(try_tags(options, report))
+        quality = remembered_quality(user_cache(), options, report)
     found = room_map(quality, room)
     rows = [
         [str(n), *(f"{share:.0%}" for share in shares)] for n, shares in zip(found.count, found.share_safe, strict=True)

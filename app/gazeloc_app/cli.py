@@ -275,7 +275,7 @@ def advise(
 ) -> None:
     """Say which tag size, and how many, a room needs so that a wearer mostly sees a tag in its safe range.
 
-    Draws, searches and solves thousands of tags first, which takes some minutes.
+    Draws, searches and solves thousands of tags first, which takes some minutes; what came of it is kept.
 
     Args:
         width: One side of the room in metres.

@@ -16,6 +16,7 @@ from gazeloc_core.alignment import Alignment
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.artifacts import HEADER, Artifact
 from gazeloc_core.camera import Camera
+from gazeloc_core.chart_file import read_charts
 from gazeloc_core.charts import Drawing
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.evaluate import evaluate, match_times
@@ -29,7 +30,6 @@ from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
 from gazeloc_core.stages import inputs, registration
-from gazeloc_core.stages.figures import load_figures
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.tag_types import TagCorners
@@ -211,9 +211,16 @@ class ProjectData:
         )
 
     def figures(self, recording: str) -> tuple[dict[str, Drawing], tuple[str, ...]] | None:
-        """The charts that were drawn for a recording, and why others are missing; None before they were drawn."""
-        artifact = self.project.artifact(recording, "figures")
-        return self._read(f"{recording} figures", artifact, lambda: load_figures(self.project, recording))
+        """The charts that were drawn for a recording, and why others are missing; None before any were drawn."""
+        found = [self._charts(recording, stage) for stage in ("figures", "advice")]
+        drawn = [one for one in found if one is not None]
+        if not drawn:
+            return None
+        return {name: chart for charts, _ in drawn for name, chart in charts.items()}, drawn[0][1]
+
+    def _charts(self, recording: str, stage: str) -> tuple[dict[str, Drawing], tuple[str, ...]] | None:
+        artifact = self.project.artifact(recording, stage)
+        return self._read(f"{recording} {stage}", artifact, lambda: read_charts(artifact))
 
     def tag_points(self, recording: str) -> SfmTagCenters | None:
         """The reconstruction's points under tags (figure 9); None without tags or a reconstruction."""

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gazeloc_app.app import serve
 from gazeloc_core import __version__
-from gazeloc_core.errors import GazelocError
 from gazeloc_core.hashing import FileHasher
 from gazeloc_core.project import Project
 from gazeloc_core.resources import sample_scene
 from gazeloc_core.scene_project import scene_settings
+from gazeloc_core.user_cache import user_cache
 
 SCENE = "studio"
 
@@ -32,12 +32,5 @@ def demo_project(folder: Path) -> Project:
 
 
 def _folder() -> Path:
-    base = os.environ.get("GAZELOC_DEMO") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(base) / "gazeloc"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GazelocError(
-            f"{folder}: the demo cannot be kept there ({error.strerror}); set GAZELOC_DEMO to another folder."
-        ) from error
-    return folder
+    asked = os.environ.get("GAZELOC_DEMO")
+    return Path(asked) / "gazeloc" if asked else user_cache()

@@ -7,10 +7,12 @@ from pathlib import Path
 from gazeloc_app.jobs import Outcome
 from gazeloc_app.state import Level
 from gazeloc_core import pipeline
+from gazeloc_core.chart_file import read_charts
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
-from gazeloc_core.stages import figures, registration
+from gazeloc_core.stages import advice, figures, registration
+from gazeloc_core.user_cache import user_cache
 
 _LEVELS = {"good": Level.INFO, "warning": Level.WARNING, "bad": Level.ERROR}
 
@@ -80,7 +82,12 @@ def draw_figures(folder: Path, report: Report, *, recording: str) -> Outcome:
     project = Project.open(folder)
     charts = figures.draw_figures(project, recording, report)
     if not charts:
-        return Outcome(
-            "There is nothing to draw: " + " ".join(figures.load_figures(project, recording)[1]), Level.WARNING
-        )
+        _, notes = read_charts(project.artifact(recording, "figures"))
+        return Outcome("There is nothing to draw: " + " ".join(notes), Level.WARNING)
     return Outcome(f"{len(charts)} figures were drawn.")
+
+
+def draw_advice(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """The maps that say which tags, and how many, the scanned room needs."""
+    advice.draw_advice(Project.open(folder), recording, user_cache(), report=report)
+    return Outcome("The maps of section IX are drawn for this recording's lens, tag size and room.")

@@ -5,85 +5,44 @@ from __future__ import annotations
 import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats
-from gazeloc_core.charts import Chart, HeatMap, Series
+from gazeloc_core.charts import Chart, Series
 from gazeloc_core.errors import InputError
 from gazeloc_core.evaluate import match_times
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
+from gazeloc_core.remembered_quality import remembered_quality
+from gazeloc_core.safe_charts import advice_maps, quality_maps
 from gazeloc_core.safe_range import (
     SafeRangeOptions,
     TagQuality,
     is_in_safe_range,
     least_safe_pixels,
     safe_cells,
-    tag_quality,
-    try_tags,
 )
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_advice import RoomOptions, room_map, size_map
+from gazeloc_core.tag_advice import RoomOptions
 from gazeloc_core.tag_counts import TagCountOptions, tag_counts, true_views
 from gazeloc_core.truth import read_tum
 
 SIZE_M = 0.16
 ROOM_M = (4.0, 5.0)
 SMALL_GRID = SafeRangeOptions(pixels=(20, 33, 57, 115), angles_deg=(0, 30, 60), repeats=4)
-DISTANCES_M: Floats = np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0])
-SIZES_M: Floats = np.array([0.08, 0.10, 0.12, 0.16, 0.20, 0.24])
 
 
 def safe_range(workspace: Workspace, report: Report) -> Finding:
     """Detection rate, pose error and ambiguity against pixels per tag and angle; and what to print for a room."""
     quality = quality_of(workspace, report)
-    options = RoomOptions(width_m=ROOM_M[0], length_m=ROOM_M[1])
-    sizes = size_map(quality, options.focal_px, DISTANCES_M, SIZES_M)
-    rooms = room_map(quality, options)
-    axes = ("viewing angle [°]", "pixels per tag")
-    maps = {
-        "detection": HeatMap(
-            "Detection rate", *axes, "share", quality.angle_deg, quality.pixels, quality.detection_rate
-        ),
-        "position": HeatMap(
-            f"Position error of a {100 * SIZE_M:.0f} cm tag",
-            *axes,
-            "cm",
-            quality.angle_deg,
-            quality.pixels,
-            100 * SIZE_M * quality.position_error_sizes,
-        ),
-        "rotation": HeatMap(
-            "Rotation error", *axes, "°", quality.angle_deg, quality.pixels, quality.rotation_error_deg
-        ),
-        "flipped": HeatMap(
-            "Wrong one of the two poses", *axes, "share", quality.angle_deg, quality.pixels, quality.flipped_share
-        ),
-        "sizes": HeatMap(
-            "Widest safe angle, by tag size and distance",
-            "tag size [m]",
-            "distance [m]",
-            "°",
-            sizes.size_m,
-            sizes.distance_m,
-            sizes.widest_deg,
-        ),
-        "rooms": HeatMap(
-            f"Views with a safe tag in a room of {ROOM_M[0]:g} x {ROOM_M[1]:g} m",
-            "tag size [m]",
-            "tags in the room",
-            "share",
-            rooms.size_m,
-            rooms.count.astype(np.float64),
-            rooms.share_safe,
-        ),
-    }
+    maps = quality_maps(quality, SIZE_M) | advice_maps(quality, RoomOptions(width_m=ROOM_M[0], length_m=ROOM_M[1]))
     return Finding(text=_range_text(quality), tables={"grid": _grid_rows(quality)}, charts=maps)
 
 
 def quality_of(workspace: Workspace, report: Report) -> TagQuality:
     """What single tags are worth, on the grid of this run's size."""
-    return tag_quality(try_tags(SMALL_GRID if workspace.size == "small" else SafeRangeOptions(), report))
+    options = SMALL_GRID if workspace.size == "small" else SafeRangeOptions()
+    return remembered_quality(workspace.cache, options, report)
 
 
 def tag_count(workspace: Workspace, report: Report) -> Finding:

@@ -11,9 +11,9 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.charts import Chart, Drawing, Series, chart_from_json
-from gazeloc_core.errors import GazelocError, InputError, ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.chart_file import write_charts
+from gazeloc_core.charts import Chart, Drawing, Series
+from gazeloc_core.errors import GazelocError, InputError
 from gazeloc_core.keypoint_count import KeypointCountErrors, KeypointCountOptions, exact_pairs, keypoint_count_errors
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
@@ -23,8 +23,6 @@ from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
 from gazeloc_core.stages.scan import tag_entry
 from gazeloc_core.tag_analysis import PlaceErrors, SolverAnalysis, analyse_solver, tag_place_errors
 from gazeloc_core.tag_types import TagSightings
-
-_FILE = "charts.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,28 +61,8 @@ def draw_figures(project: Project, recording: str, report: Report = silent) -> d
         )
     except GazelocError as error:
         notes.append(str(error))
-    project.artifact(recording, "figures").write(
-        lambda folder: write_json_atomically(folder / _FILE, {name: chart.to_json() for name, chart in charts.items()}),
-        options={},
-        inputs={},
-        notes=tuple(notes),
-    )
+    write_charts(project.artifact(recording, "figures"), charts, tuple(notes))
     return charts
-
-
-def load_figures(project: Project, recording: str) -> tuple[dict[str, Drawing], tuple[str, ...]]:
-    """The charts of `draw_figures`, and why others are missing.
-
-    Raises:
-        ProjectError: if they have not been drawn, or the file is damaged.
-    """
-    artifact = project.artifact(recording, "figures")
-    header = artifact.header()
-    try:
-        rows = read_json(artifact.folder / _FILE, "charts")
-        return {name: chart_from_json(value) for name, value in rows.items()}, header.notes
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ProjectError(f"{artifact.folder}: the charts are damaged ({error}); draw them again.") from error
 
 
 def tag_charts(project: Project, views: TagViews) -> dict[str, Drawing]:

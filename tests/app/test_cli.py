@@ -278,9 +278,10 @@ def test_what_takes_long_to_import_is_not_imported_needlessly(home: Path, words:
     assert not imported & absent
 
 
-def test_advice_on_tags_is_a_table_of_shares(capsys, monkeypatch):
+def test_advice_on_tags_is_a_table_of_shares(capsys, monkeypatch, tmp_path):
     from gazeloc_app import advice
 
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     small = advice.SafeRangeOptions
     monkeypatch.setattr(
         advice,

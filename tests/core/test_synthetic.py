@@ -23,6 +23,7 @@ from gazeloc_core.synthesis.room import X, Z, subpixels
 from gazeloc_core.synthesis.routes import ROUTES
 from gazeloc_core.synthetic import (
     PRESETS,
+    glasses_capture,
     read_options,
     recording_name,
     render,
@@ -109,7 +110,7 @@ def test_a_wearer_in_a_hurry_takes_the_same_way_faster(route):
 
 def test_a_second_route_shares_the_scan(tmp_path: Path):
     small = replace(TINY, phone_frames=6, phone_seconds=6.0, glasses_seconds=0.2, exact_room=False)
-    both = replace(small, routes=("first", "second"), hurry=1.2)
+    both = replace(small, routes=("first", "second"), hurry=(1.2, 1.4))
     write_scene(tmp_path, both)
     assert read_options(tmp_path) == both
     recordings = [open_recording(tmp_path / recording_name(route)) for route in both.routes]
@@ -122,6 +123,7 @@ def test_a_second_route_shares_the_scan(tmp_path: Path):
             tmp_path / "truth" / truth_name(route).replace("truth/glasses", "gaze3d").replace("tum", "csv")
         ).is_file()
     assert np.linalg.norm(starts[0] - starts[1]) > 1
+    assert [glasses_capture(route, both).path.hurry for route in both.routes] == [1.2, 1.4]
     facts = hardness(tmp_path, both, "second")
     assert 5 < facts.mean_grey < 200
     assert facts.blur_p90_px > 0
@@ -141,7 +143,7 @@ def test_table_two_has_two_settings_of_markers_each_plain_and_hard():
         plain, hard = scenes[f"table2-{setting}-plain"], scenes[f"table2-{setting}-hard"]
         assert set(hard.tag_ids) < set(plain.tag_ids)
         assert (len(hard.tag_ids), hard.bare, hard.tag_size_m) == (5, True, plain.tag_size_m)
-        assert hard.hurry > plain.hurry
+        assert min(hard.hurry) > max(plain.hurry)
         assert hard.glasses_gain < plain.glasses_gain
     assert set(scenes["table2-a-plain"].tag_ids).isdisjoint(scenes["table2-b-plain"].tag_ids)
 

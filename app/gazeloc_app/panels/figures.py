@@ -11,6 +11,7 @@ from gazeloc_app import tasks, widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
+from gazeloc_app.jobs import Task
 from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState
 
@@ -18,7 +19,7 @@ NONE = "(not drawn yet)"
 
 
 class FigurePanel:
-    """A button that draws the figures, and the one of them that is shown."""
+    """The buttons that draw the figures, and the one of them that is shown."""
 
     def __init__(self, gui: GuiApi, data: ProjectData, dispatch: Callable[[Action], None]):
         self._data = data
@@ -26,16 +27,25 @@ class FigurePanel:
         self._recording = ""
         self._seen: object = None
         self._draw = gui.add_button("Draw the figures", hint="From the tags that were found; takes some seconds.")
+        self._advise = gui.add_button(
+            "Draw which tags to print",
+            color="gray",
+            hint="Section IX: the safe range of a tag; which size and number this room needs. Minutes the first time.",
+        )
         self._which = gui.add_dropdown("Figure", (NONE,))
         self._notes = gui.add_html("")
         self._plot = gui.add_plotly(go.Figure(), aspect=0.9, visible=False)
-        widgets.on_user(self._draw, lambda _: self._start(), event="on_click")
+        widgets.on_user(self._draw, lambda _: self._start("Draw the figures", tasks.draw_figures), event="on_click")
+        widgets.on_user(
+            self._advise, lambda _: self._start("Draw which tags to print", tasks.draw_advice), event="on_click"
+        )
         widgets.on_user(self._which, lambda event: self._show(str(event.target.value)))
 
     def render(self, state: AppState) -> None:
         """Show the state's recording."""
         self._recording = state.recording
-        widgets.set_property(self._draw, "disabled", state.job is not None)
+        for button in (self._draw, self._advise):
+            widgets.set_property(button, "disabled", state.job is not None)
         seen = (state.recording, state.data_revision)
         if seen == self._seen:
             return
@@ -54,5 +64,5 @@ class FigurePanel:
         if chart is not None:
             self._plot.figure = to_plotly(chart)
 
-    def _start(self) -> None:
-        self._dispatch(StartJob("Draw the figures", tasks.draw_figures, (("recording", self._recording),)))
+    def _start(self, name: str, task: Task) -> None:
+        self._dispatch(StartJob(name, task, (("recording", self._recording),)))
