@@ -11,13 +11,20 @@ import numpy as np
 import pytest
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowLayer
-from gazeloc_app.browser import Browser, PickMode
+from gazeloc_app.browser import Browser
+from gazeloc_app.picking import ClickFilter
 from gazeloc_app.render_worker import Photo
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_app.state import AppState, Layer
+from gazeloc_app.tools.all import TOOLS
+from gazeloc_app.tools.camera import CameraTool
+from gazeloc_app.tools.cloud_point import CloudPointTool
+from gazeloc_app.tools.frame_point import FramePointTool
+from gazeloc_app.tools.tool import Click, Tool
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
 
 CAMERA = Camera.pinhole(960, 720, 720, 720, 470, 350)
@@ -51,29 +58,33 @@ def page(scan: RoomScan) -> SimpleNamespace:
         page.state = action.apply(page.state)
 
     page.browser = Browser(client, data, MagicMock(front=0), render, lambda: page.state, dispatch)
-    page.client, page.browser._move.value = client, False
+    page.client, page.data, page.browser._move.value = client, data, False
     return page
 
 
-def set_mode(page: SimpleNamespace, mode: PickMode) -> None:
-    page.browser._mode.value = mode
-    page.browser._last_click = (0.0, np.zeros(3))
+def take(page: SimpleNamespace, tool: type[Tool]) -> None:
+    page.browser._choice.value = tool.name
+    page.browser._filter = ClickFilter()
+
+
+def click(page: SimpleNamespace, direction: np.ndarray, **how: bool) -> None:
+    page.browser.click(Click(EYE, direction), **how)
 
 
 def look(page: SimpleNamespace, scan: RoomScan, frame: int) -> None:
     """Click the camera of one of the frames that have a picture."""
-    set_mode(page, PickMode.OFF)
+    take(page, CameraTool)
     centre = np.asarray(scan.frames_with_images[frame].scan_from_camera.translation)
-    page.browser.click(EYE, centre + np.array([0, 0, 0.05]) - EYE)
+    click(page, centre + np.array([0, 0, 0.05]) - EYE)
 
 
 def click_spot(page: SimpleNamespace, scan: RoomScan, frame: int, place: np.ndarray = PLACE) -> None:
     """Click, from beside the camera, the pixel of the picture where the place is."""
-    set_mode(page, PickMode.FRAME)
+    take(page, FramePointTool)
     pose = scan.frames_with_images[frame].scan_from_camera
     local = pose.inv().apply(place)
     in_picture = pose.apply(local / local[2] * PLANE_M)
-    page.browser.click(EYE, in_picture - EYE)
+    click(page, in_picture - EYE)
 
 
 def test_a_click_on_the_phones_camera_looks_through_it(page, scan):
@@ -85,8 +96,8 @@ def test_a_click_on_the_phones_camera_looks_through_it(page, scan):
 
 
 def test_a_camera_without_a_picture_or_in_a_hidden_layer_is_not_looked_through(page, scan):
-    set_mode(page, PickMode.OFF)
-    page.browser.click(EYE, np.array([0.5, 0, 0.05]) - EYE)
+    take(page, CameraTool)
+    click(page, np.array([0.5, 0, 0.05]) - EYE)
     page.state = ShowLayer(Layer.PHONE, False).apply(page.state)
     look(page, scan, 0)
     assert page.jobs == []
@@ -123,3 +134,48 @@ def test_moving_the_frame_slider_leaves_the_phones_picture(page, scan):
     look(page, scan, 0)
     page.browser.render(page.state)
     assert len(page.jobs) == 1
+
+
+ON_MESH = np.array([0.1, 0.2, 4.0])
+
+
+def test_a_click_with_shift_sets_a_point_on_the_scan_whatever_the_tool(page, scan):
+    page.data.raycaster.return_value = Raycaster(scan.mesh)
+    take(page, CameraTool)
+    click(page, ON_MESH - EYE)
+    assert len(page.state.annotation.keypoints) == 0
+    take(page, CameraTool)
+    click(page, ON_MESH - EYE, is_shifted=True)
+    (pair,) = page.state.annotation.keypoints
+    np.testing.assert_allclose(pair.scan, ON_MESH, atol=1e-6)
+
+
+def test_a_click_with_shift_sets_a_point_in_the_frame_that_is_looked_through(page, scan):
+    look(page, scan, 1)
+    page.browser._filter = ClickFilter()
+    pose = scan.frames_with_images[1].scan_from_camera
+    click(page, pose.apply(np.array([0.02, 0.01, PLANE_M])) - EYE, is_shifted=True)
+    (pair,) = page.state.annotation.keypoints
+    assert [sighting.frame_index for sighting in pair.scan_sightings] == [1]
+
+
+def test_taking_another_tool_puts_the_first_away(page):
+    put_away = []
+    page.browser.tool.put_away = lambda: put_away.append("camera")
+    page.browser._next_tool()
+    page.browser._next_tool()
+    assert put_away == ["camera"]
+    assert isinstance(page.browser.tool, CloudPointTool)
+
+
+@pytest.mark.parametrize(
+    ("origin", "direction"),
+    [([0, 0, 0], [0, 0, 0]), ([0, np.nan, 0], [0, 0, 1]), ([0, 0], [0, 0, 1]), ("abc", [0, 0, 1]), (None, None)],
+)
+def test_what_a_browser_sends_for_a_ray_that_is_none_is_no_click(origin, direction):
+    assert Click.of(origin, direction) is None
+
+
+def test_every_tool_says_in_words_of_its_own_what_it_does():
+    assert len({kind.name for kind in TOOLS}) == len(TOOLS)
+    assert all(kind.name[0].islower() and kind.hint.endswith(".") for kind in TOOLS)

@@ -19,9 +19,9 @@ from data import CHECKOUT, SAMPLE_SCENES
 from e2e.page import ViewerPage, chromium_path, launch
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.app import App
-from gazeloc_app.browser import PickMode
 from gazeloc_app.demo import demo_project
 from gazeloc_app.picking import pick_mesh
+from gazeloc_app.tools.scan_point import ScanPointTool
 from playwright.sync_api import Browser, sync_playwright
 
 from gazeloc_core import pipeline
@@ -94,7 +94,7 @@ def bench_start(browser: Browser, project: Project, work: Path) -> Row:
 def bench_clicks(browser: Browser, app: App, count: int = 20) -> Row:
     """Clicks on the canvas from 3 m: the keypoint against the true surface point."""
     viewer = _open(browser, app)
-    _set_mode(viewer, app, PickMode.SCAN)
+    _take(viewer, app, ScanPointTool.name)
     (page,) = app._browsers.values()
     errors = []
     for point, eye in _targets(app, count):
@@ -119,7 +119,7 @@ def bench_round_trip(browser: Browser, app: App, pairs: int = 40) -> Row:
     In turns, by the very same gesture: for the empty one the callback's body is exchanged.
     """
     viewer = _open(browser, app)
-    _set_mode(viewer, app, PickMode.SCAN)
+    _take(viewer, app, ScanPointTool.name)
     target = _targets(app, 1, seed=5)[0][0]
     times: list[tuple[float, float]] = []
     for number in range(pairs + 3):
@@ -140,8 +140,8 @@ def _time_click(viewer: ViewerPage, app: App, point: Floats, which: str) -> floa
     node = "/keypoints/k1/scan" if which == "app" else _EMPTY
     (page,) = app._browsers.values()
     if which == "empty":
-        page.click = lambda origin, _: app.server.scene.add_icosphere(  # type: ignore[method-assign, assignment]
-            _EMPTY, radius=0.035, color=(255, 0, 200), subdivisions=2, position=origin
+        page.click = lambda click, **_: app.server.scene.add_icosphere(  # type: ignore[method-assign, assignment]
+            _EMPTY, radius=0.035, color=(255, 0, 200), subdivisions=2, position=click.origin
         )
     viewer.settle()
     viewer.page.evaluate(_TIME_TO_NODE, node)
@@ -161,7 +161,7 @@ def _time_click(viewer: ViewerPage, app: App, point: Floats, which: str) -> floa
 def bench_two_browsers(browser: Browser, app: App, count: int = 300) -> Row:
     """Clicks and undos 200 ms apart, from two browsers at once: applied, in order, saved."""
     viewers = [_open(browser, app), _open(browser, app)]
-    _set_mode(viewers[0], app, PickMode.SCAN)
+    _take(viewers[0], app, ScanPointTool.name)
     targets = [point for point, _ in _targets(app, 24, seed=7, from_start=viewers[0])]
     viewers[0].page.wait_for_timeout(500)
     applied, sent = app.store.applied, []
@@ -224,9 +224,9 @@ def _open(browser: Browser, app: App) -> ViewerPage:
     return viewer.wait_for_node("/scan").wait_until_drawn(300).wait_for_clicks()
 
 
-def _set_mode(viewer: ViewerPage, app: App, mode: PickMode) -> None:
+def _take(viewer: ViewerPage, app: App, name: str) -> None:
     for page in app._browsers.values():
-        page._mode.value = mode
+        page._choice.value = name
     viewer.page.wait_for_timeout(300)
 
 

@@ -9,9 +9,12 @@ import pytest
 from app_project import BOXES, SFM_FROM_SCAN, WALLS, make_app_project, true_poses
 from e2e.app_page import AppPage
 from gazeloc_app.app import App
-from gazeloc_app.browser import PickMode
 from gazeloc_app.scene_view import RED
 from gazeloc_app.state import Layer
+from gazeloc_app.tools.camera import CameraTool
+from gazeloc_app.tools.cloud_point import CloudPointTool
+from gazeloc_app.tools.frame_point import FramePointTool
+from gazeloc_app.tools.scan_point import ScanPointTool
 
 pytestmark = pytest.mark.e2e
 
@@ -63,7 +66,7 @@ def test_the_room_is_there_in_its_colours(open_app):
 
 def test_clicks_on_the_mesh_make_keypoints_within_a_centimetre(open_app, project):
     page = open_app()
-    page.choose("A click", PickMode.SCAN)
+    page.choose("A click", ScanPointTool.name)
     for number, spot in enumerate(SPOTS, start=1):
         page.click_for(spot, lambda: len(page.pairs))
         clicked = np.array(page.pairs[-1].scan)
@@ -79,7 +82,7 @@ def test_clicks_on_the_mesh_make_keypoints_within_a_centimetre(open_app, project
 
 def test_dragging_in_pick_mode_orbits_and_makes_nothing(open_app):
     page = open_app()
-    page.choose("A click", PickMode.SCAN)
+    page.choose("A click", ScanPointTool.name)
     before = page.viewer.project(SPOTS[:1])[0]
     mouse = page.page.mouse
     for _ in range(3):
@@ -95,8 +98,8 @@ def test_dragging_in_pick_mode_orbits_and_makes_nothing(open_app):
 
 def test_the_pick_mode_is_of_one_browser_and_a_reload_forgets_nothing_else(open_app):
     first, second = open_app(), open_app()
-    first.choose("A click", PickMode.SCAN)
-    first.viewer.wait_until(lambda: any(b.mode is PickMode.SCAN for b in first.app._browsers.values()))
+    first.choose("A click", ScanPointTool.name)
+    first.viewer.wait_until(lambda: any(isinstance(b.tool, ScanPointTool) for b in first.app._browsers.values()))
     second.viewer.click_at_point(SPOTS[0])
     second.page.wait_for_timeout(700)
     assert not first.pairs
@@ -105,7 +108,7 @@ def test_the_pick_mode_is_of_one_browser_and_a_reload_forgets_nothing_else(open_
 
     first.page.reload()
     first.viewer.wait_until_drawn(300).wait_for_clicks().wait_for_node("/keypoints/k1/scan")
-    assert first.field("A click").input_value() == PickMode.OFF
+    assert first.field("A click").input_value() == CameraTool.name
     first.viewer.click_at_point(SPOTS[2])
     first.page.wait_for_timeout(700)
     assert len(first.pairs) == 1
@@ -113,7 +116,7 @@ def test_the_pick_mode_is_of_one_browser_and_a_reload_forgets_nothing_else(open_
 
 def test_pairs_are_named_switched_deleted_undone_and_redone_by_hand(open_app, project):
     page = open_app()
-    page.choose("A click", PickMode.SCAN)
+    page.choose("A click", ScanPointTool.name)
     page.click_for(SPOTS[0], lambda: len(page.pairs))
     page.tab("Keypoints")
     page.until(lambda: page.field("Name").input_value() == "Keypoint 1")
@@ -135,14 +138,14 @@ def test_the_key_p_goes_through_the_modes_and_says_which(open_app):
     page = open_app()
     page.page.mouse.click(5, 5)
     page.page.keyboard.press("p")
-    page.page.get_by_text(f"A click {PickMode.SCAN}.").wait_for(timeout=10_000)
-    assert page.field("A click").input_value() == PickMode.SCAN
+    page.page.get_by_text(f"A click {ScanPointTool.name}.").wait_for(timeout=10_000)
+    assert page.field("A click").input_value() == ScanPointTool.name
 
 
 def test_a_click_on_the_cloud_makes_a_point_of_the_reconstruction(open_app):
     page = open_app()
     align(page)
-    page.choose("A click", PickMode.SFM)
+    page.choose("A click", CloudPointTool.name)
     page.click_for(SPOTS[3], lambda: len(page.pairs))
     in_sfm = np.array(page.pairs[0].sfm)
     assert np.linalg.norm(SFM_FROM_SCAN.inverse().apply(in_sfm) - SPOTS[3]) < 0.15
@@ -153,7 +156,7 @@ def test_one_spot_clicked_in_two_frames_is_a_keypoint_by_triangulation(open_app)
     page = open_app()
     spot = np.array([1.2, 0.35, 0.74])  # on the desk
     shown = lambda: [len(pair.sightings) for pair in page.pairs]  # noqa: E731
-    page.choose("A click", PickMode.FRAME)
+    page.choose("A click", FramePointTool.name)
     for count, frame in enumerate((0, 12), start=1):
         if frame:
             page.field("Frame").fill(str(frame))
@@ -295,7 +298,7 @@ def test_exporting_writes_files(open_app, tmp_path):
 def test_clicks_and_undos_from_two_browsers_at_once_are_all_applied_in_order_and_saved(open_app, project):
     pages = [open_app(), open_app()]
     for page in pages:
-        page.choose("A click", PickMode.SCAN)
+        page.choose("A click", ScanPointTool.name)
         page.tab("Keypoints")
     store = pages[0].app.store
     applied, history = store.applied, []

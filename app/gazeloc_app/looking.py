@@ -1,0 +1,104 @@
+"""Looking through a camera: one browser's view put where a camera was, with the camera's picture before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import viser
+from scipy.spatial.transform import RigidTransform
+
+from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.picks import Side
+from gazeloc_app.data import ProjectData
+from gazeloc_app.render_process import RenderProcess
+from gazeloc_app.render_worker import Frame, Photo, camera_text
+from gazeloc_app.scene.frames import FrameInSceneLayer, look_through
+from gazeloc_app.scene_view import when_picture
+from gazeloc_app.sightings import frame_pose
+from gazeloc_app.state import AppState, Level
+from gazeloc_core.camera import Camera
+
+
+class Target(NamedTuple):
+    """The frame that is looked through: of a recording, or (`recording` None) of the scan's `frames_with_images`."""
+
+    recording: str | None
+    frame: int
+
+    @property
+    def side(self) -> Side:
+        """Which side of a keypoint a click in it sets."""
+        return Side.SCAN if self.recording is None else Side.SFM
+
+
+class Looking:
+    """What one browser looks through."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        data: ProjectData,
+        render: RenderProcess,
+        state: Callable[[], AppState],
+        dispatch: Callable[[Action], None],
+    ):
+        self._client, self._data, self._render = client, data, render
+        self._state, self._dispatch = state, dispatch
+        self._picture = FrameInSceneLayer(client.scene)
+        self.target: Target | None = None
+        """What is looked through now; None for the room from outside."""
+
+    def look(self, frame: int) -> None:
+        """Put this browser's camera where the frame's camera was, with the frame's picture before it."""
+        state = self._state()
+        pose, camera = frame_pose(self._data, state, frame), self._data.camera(state.recording)
+        if pose is None or camera is None:
+            text = f"Frame {frame} is not in the reconstruction, so there is nothing to look through; try a keyframe."
+            self._dispatch(Notify(Level.WARNING, text))
+            return
+        job = Frame(recording=state.recording, index=frame)
+        self._look_from(Target(state.recording, frame), pose, camera, job)
+
+    def look_with_phone(self, frame: int) -> None:
+        """Put this browser's camera where the phone's was, with the picture of `scan.frames_with_images[frame]`."""
+        photo = self._data.scan().frames_with_images[frame]
+        job = Photo(path=str(photo.image_path), camera=camera_text(photo.camera))
+        self._look_from(Target(None, frame), photo.scan_from_camera, photo.camera, job)
+
+    def leave(self) -> None:
+        """Take the frame's picture away; the camera stays."""
+        self.target = None
+        self._picture.show(None, None, None)
+
+    def follow(self, state: AppState) -> None:
+        """Go on to the frame of the slider while looking through a camera of the recording."""
+        at = self.target
+        if at is not None and at.side is Side.SFM and at != Target(state.recording, state.frame):
+            self.look(state.frame)
+
+    def pose_and_camera(self, state: AppState) -> tuple[RigidTransform | None, Camera | None]:
+        """Where the camera that is looked through stands (`scan_from_camera`), and the camera; None where unknown."""
+        at = self.target
+        if at is None:
+            return None, None
+        if at.recording is None:
+            photo = self._data.scan().frames_with_images[at.frame]
+            return photo.scan_from_camera, photo.camera
+        return frame_pose(self._data, state, at.frame), self._data.camera(at.recording)
+
+    def _look_from(self, target: Target, pose: RigidTransform, camera: Camera, job: Frame | Photo) -> None:
+        self.target = target
+        width, height = int(self._client.camera.image_width), int(self._client.camera.image_height)
+        view = look_through(pose, camera, width / max(height, 1))
+        with self._client.atomic():
+            self._client.camera.fov = view.fov_rad
+            self._client.camera.wxyz = view.wxyz
+            self._client.camera.position = view.position
+
+        def paste(image: Any) -> None:
+            if self.target == target:
+                self._picture.show(pose, camera, image)
+
+        future = self._render.submit(job, key=f"look {self._client.client_id}")
+        future.add_done_callback(when_picture(paste))
