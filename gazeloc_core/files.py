@@ -14,7 +14,11 @@ from gazeloc_core.errors import InputError
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Replace a text file in one step, flushed to disk first."""
+    """Replace a text file in one step; on return the new one is on the disk.
+
+    The order matters: content first, then the name, then the folder that holds the name. Else a power cut could leave
+    the new name with nothing in it, or bring the old file back.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     with part.open("w", encoding="utf-8", newline="\n") as file:
@@ -22,6 +26,18 @@ def write_text_atomically(path: Path, text: str) -> None:
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)
+    flush_folder(path.parent)
+
+
+def flush_folder(folder: Path) -> None:
+    """Put a folder's names on the disk, after files in it were made or renamed."""
+    if os.name == "nt":  # Windows cannot open folders, and orders renames itself
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def write_json_atomically(path: Path, value: Any) -> None:
@@ -33,7 +49,8 @@ def write_json_atomically(path: Path, value: Any) -> None:
 def folder_replaced_atomically(folder: Path) -> Iterator[Path]:
     """A new empty folder to write into that takes the place of `folder` when the block ends well.
 
-    If the block raises, the new folder goes and the old one stays as it was.
+    If the block raises, the new folder goes and the old one stays as it was. A process that is killed between the two
+    renames leaves the old one under its temporary name: `settle_folders` puts it back.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     part = folder.with_name(f".{folder.name}.{os.getpid()}.part")
@@ -50,6 +67,22 @@ def folder_replaced_atomically(folder: Path) -> Iterator[Path]:
         folder.rename(old)
     part.rename(folder)
     shutil.rmtree(old, ignore_errors=True)
+
+
+def settle_folders(parent: Path) -> None:
+    """Clear up after processes that were killed while they replaced a folder in `parent`.
+
+    An old folder without a successor takes its place again; what else was left goes. Only for who holds the lock.
+    """
+    for left in sorted(parent.glob(".*.*.old")):
+        place = parent / left.name[1:].rsplit(".", 2)[0]
+        if not place.exists():
+            left.rename(place)
+    for left in [*parent.glob(".*.*.old"), *parent.glob(".*.*.part")]:
+        if left.is_dir():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
 
 
 def read_json(path: Path, what: str) -> Any:

@@ -10,6 +10,7 @@ import json
 import os
 import socket
 import sys
+from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from typing import IO
@@ -51,7 +52,9 @@ class WriteLock:
             ) from error
         self._file.seek(0)
         self._file.truncate()
-        self._file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "command": sys.argv[:3]}))
+        since = datetime.now().astimezone().isoformat(timespec="minutes")
+        own = {"pid": os.getpid(), "host": socket.gethostname(), "since": since, "command": sys.argv[:3]}
+        self._file.write(json.dumps(own))
         self._file.flush()
 
     def release(self) -> None:
@@ -73,6 +76,7 @@ def _holder(file: IO[str]) -> str:
     file.seek(0)
     try:
         value = json.loads(file.read())
-        return f"process {value['pid']} on {value['host']}: {' '.join(value['command'])}"
+        since = datetime.fromisoformat(value["since"]).strftime("%Y-%m-%d %H:%M")
+        return f"process {value['pid']} on {value['host']} since {since}: {' '.join(value['command'])}"
     except (ValueError, KeyError, TypeError):
         return "it left no name"

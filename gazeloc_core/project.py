@@ -3,6 +3,7 @@
     PROJECT/
       project.json                     what belongs to the project (paths, tags), the alignment and method chosen
       annotations/<recording>.json     clicked keypoints
+      annotations/<recording>.history.jsonl   every step that people took in the app, for undo (app: saving.py)
       scan/<stage>/                    artifacts of the scan
       recordings/<recording>/<stage>/  artifacts of a recording
       recordings/<recording>/<method>/<stage>/  what one method made of it: poses, gaze
@@ -22,7 +23,7 @@ from typing import Any
 
 from gazeloc_core.artifacts import Artifact
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.files import read_json, settle_folders, write_json_atomically
 from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.lock import WriteLock
@@ -146,6 +147,14 @@ class Project:
         """
         return WriteLock(self.folder / ".lock")
 
+    def settle(self) -> None:
+        """Clear up after a process that was killed while it wrote. Only for who holds the lock."""
+        for parent in (self.folder, *(self.folder / where for where in ("annotations", "scan"))):
+            settle_folders(parent)
+        for recording in self.folder.glob("recordings/*"):
+            for parent in (recording, *(recording / method.value for method in Method)):
+                settle_folders(parent)
+
     def add_recording(self, name: str, entry: RecordingEntry) -> None:
         """Add one recording.
 
@@ -210,6 +219,10 @@ class Project:
     def save_keypoints(self, recording: str, keypoints: KeypointSet) -> None:
         """Write the clicked keypoints of a recording."""
         write_json_atomically(self._keypoints_path(recording), keypoints.to_json())
+
+    def history_path(self, recording: str) -> Path:
+        """The file of the steps that people took in the app."""
+        return self.folder / "annotations" / f"{recording}.history.jsonl"
 
     def hash_of_file(self, path: Path) -> str:
         """The content hash of a file or folder outside the project, remembered between runs."""

@@ -10,7 +10,6 @@ import logging
 import signal
 import threading
 from contextlib import ExitStack
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -37,13 +36,14 @@ from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Describe, SeenTags, Sources
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
+from gazeloc_app.saving import Saver
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
-from gazeloc_app.state import Annotation, AppState, Level
+from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.project import Chosen, Project
+from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
 from gazeloc_core.stages import inputs
 
@@ -63,9 +63,11 @@ class App:
         self.project = project
         with ExitStack() as undo:  # what was begun is ended again where a later step is refused
             self._lock = undo.enter_context(project.lock())
+            project.settle()
             self.data = ProjectData(project, self._say_damage)
             self.data.scan()
-            self.store = Store(_first_state(project), batch=lambda: self.server.atomic())
+            self._saver = Saver(project, self._say_damage)
+            self.store = Store(_first_state(project, self._saver), batch=lambda: self.server.atomic())
             self.data.recording(self.store.state.recording)
             self.jobs = JobRunner(project.folder, self.store.dispatch)
             self._render = RenderProcess(_sources(project), self._say_trouble)
@@ -73,13 +75,13 @@ class App:
             self.server = make_server(port, self._routes(), host=host, title=f"GazeLoc · {project.folder.name}")
             undo.pop_all()
         self._browsers: dict[int, Browser] = {}
-        self._unsaved: dict[str, Annotation] = {}
         self._last_job = 0
         self.scene = SceneView(self.server, self.data, self._render)
         self._build_panels()
         self.store.add_view(self.scene.render)
         self.store.add_view(self._render_browsers)
-        self.store.add_effect(self._save)
+        self.store.add_saver(self._saver.commit)
+        self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
         self.store.add_effect(self._show_first_pose)
         self.server.on_client_connect(self._connected)
@@ -183,33 +185,9 @@ class App:
         try:
             self.project.recording(name)
             self.data.recording(name)
-            self.store.dispatch(OpenRecording(name, self._unsaved.get(name) or _annotation(self.project, name)))
+            self.store.dispatch(OpenRecording(name, lambda: self._saver.open(name)))
         except GazelocError as error:
             self.store.dispatch(Notify(Level.ERROR, str(error)))
-
-    def _save(self, before: AppState, after: AppState) -> None:
-        """Write what people decided; what cannot be written is kept and tried again with every further action."""
-        if before.annotation != after.annotation:
-            self._unsaved[after.recording] = after.annotation
-        for name, annotation in list(self._unsaved.items()):
-            try:
-                self._write(name, annotation)
-            except OSError as error:
-                raise ProjectError(
-                    f"{self.project.folder}: your last changes could not be saved ({error.strerror}); free some space "
-                    "or mend the folder's permissions and go on, they are kept until then."
-                ) from error
-            del self._unsaved[name]
-
-    def _write(self, recording: str, annotation: Annotation) -> None:
-        self.project.save_keypoints(recording, annotation.keypoints)
-        chosen = None
-        if annotation.alignment is not None:
-            chosen = Chosen(alignment=annotation.alignment, by_person=annotation.alignment_by_person)
-        if self.project.settings.chosen.get(recording) != chosen:
-            self.project.choose(recording, chosen)
-        if self.project.method(recording) is not annotation.method:
-            self.project.choose_method(recording, annotation.method)
 
     def _show_first_pose(self, before: AppState, after: AppState) -> None:
         """A recording often begins before its first pose: start where there is something to compare."""
@@ -228,7 +206,7 @@ class App:
         if after.job is None or after.job.number == self._last_job:
             return
         self._last_job = after.job.number
-        if self._unsaved:
+        if self._saver.has_unsaved:
             text = f"“{after.job.name}” was not begun: it reads the project's files, and those could not be saved."
             self.store.dispatch(JobEnded(Level.ERROR, text))
         else:
@@ -249,19 +227,11 @@ def serve(folder: Path, *, host: str = "127.0.0.1", port: int = 8080, run_everyt
     app.stop()
 
 
-def _first_state(project: Project) -> AppState:
+def _first_state(project: Project, saver: Saver) -> AppState:
     names = tuple(project.settings.recordings)
     if not names:
         raise ProjectError(f"{project.folder}: the project has no recording; add one with `gazeloc add`.")
-    return replace(AppState(names, names[0]), annotation=_annotation(project, names[0]))
-
-
-def _annotation(project: Project, recording: str) -> Annotation:
-    chosen = project.settings.chosen.get(recording)
-    annotation = Annotation(project.keypoints(recording), method=project.method(recording))
-    if chosen is None:
-        return annotation
-    return replace(annotation, alignment=chosen.alignment, alignment_by_person=chosen.by_person)
+    return saver.open(names[0]).put_into(AppState(names, names[0]))
 
 
 def _sources(project: Project) -> Sources:

@@ -1,4 +1,4 @@
-"""The one loop: takes actions from a queue, applies them to the frozen state, saves, and lets every view render.
+"""The one loop: takes actions from a queue, applies them to the frozen state, saves, and then lets every view render.
 
 viser runs callbacks on many threads at once and in no order (50 clicks of `n += 1` were measured to give 2 to 5), so
 no callback touches the state: it calls `dispatch`. The loop runs on a thread of its own, or in tests by `step()`.
@@ -25,8 +25,8 @@ Effect = Callable[[AppState, AppState], None]
 class Store:
     """Holds the state.
 
-    Actions that wait are applied as one batch, in order; then every view renders, then effects run (they save and
-    start jobs): what a click shows does not wait for the disk.
+    Actions that wait are applied as one batch, in order; then savers put it on the disk, so that nothing is shown that
+    a crash could take back; then every view renders; then effects run (they start jobs).
     """
 
     def __init__(self, state: AppState, batch: Callable[[], AbstractContextManager[object]] = nullcontext):
@@ -34,6 +34,7 @@ class Store:
         self._state = state
         self._batch = batch
         self._queue: queue.SimpleQueue[Action | None] = queue.SimpleQueue()
+        self._savers: list[Effect] = []
         self._effects: list[Effect] = []
         self._views: list[View] = []
         self._thread: threading.Thread | None = None
@@ -44,6 +45,13 @@ class Store:
     def state(self) -> AppState:
         """The state now."""
         return self._state
+
+    def add_saver(self, saver: Effect) -> None:
+        """Call `saver(before, after)` after every batch of actions, on the loop, before the views render.
+
+        What it raises is shown with the state: the person then knows that it is not saved.
+        """
+        self._savers.append(saver)
 
     def add_effect(self, effect: Effect) -> None:
         """Call `effect(before, after)` after every batch of actions, on the loop, once the views have rendered."""
@@ -98,11 +106,12 @@ class Store:
             earlier = self._state
             self._apply(action)
             if self._state.recording != earlier.recording:  # what was decided about the one that is left is saved first
-                self._run_effects(before, earlier)
+                self._run_all([*self._savers, *self._effects], before, earlier)
                 before = self._state
+        self._run_all(self._savers, before, self._state)
         self._render()
         shown = self._state
-        self._run_effects(before, shown)
+        self._run_all(self._effects, before, shown)
         if self._state is not shown:
             self._render()
 
@@ -116,8 +125,8 @@ class Store:
             self._state = self._state.noticed(Level.ERROR, f"A fault in GazeLoc stopped this action: {error}.")
         self.applied += 1
 
-    def _run_effects(self, before: AppState, after: AppState) -> None:
-        for effect in self._effects:
+    def _run_all(self, effects: list[Effect], before: AppState, after: AppState) -> None:
+        for effect in effects:
             try:
                 effect(before, after)
             except GazelocError as error:

@@ -412,7 +412,10 @@ def test_a_second_writer_is_told_who_writes(home: Path, capfd, words: list[str])
         main([words[0], str(home / "project"), *(str(home / w) if w == "walk" else w for w in words[1:])])
     assert stop.value.code == 2
     sentence = one_sentence(capfd.readouterr().err)
-    assert re.search(r"project: another process is writing to this project \(process \d+ on .*\); close it", sentence)
+    assert re.search(
+        r"project: another process is writing to this project \(process \d+ on .* since [\d: -]{16}: .*\); close it",
+        sentence,
+    )
     assert contents(home) == before
 
 

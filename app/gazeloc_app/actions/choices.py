@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from gazeloc_app.state import Annotation, AppState, Level
+from gazeloc_app.history import History
+from gazeloc_app.state import AppState, Level
 from gazeloc_core.methods import Method
 
 
@@ -45,17 +47,17 @@ class CompareMethod:
 
 @dataclass(frozen=True)
 class OpenRecording:
-    """Another recording was opened, with what people decided about it so far."""
+    """Another recording was opened. `history` gives what people decided about it, asked when the loop gets here."""
 
     recording: str
-    annotation: Annotation
+    history: Callable[[], History]
 
     def apply(self, state: AppState) -> AppState:
-        """The state of the other recording, its undo list empty; refused while a job is about the one that is open."""
+        """The state of the other recording with its own history; refused while a job is about the one that is open."""
         if state.job is not None:
             return state.noticed(Level.WARNING, f"“{state.job.name}” is still running; wait for it or cancel it.")
         return replace(
-            AppState(state.recordings, self.recording, self.annotation),
+            self.history().put_into(AppState(state.recordings, self.recording)),
             layers=state.layers,
             compared=state.compared,
             draws_tags=state.draws_tags,

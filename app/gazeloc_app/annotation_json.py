@@ -1,0 +1,42 @@
+"""What people decided as JSON, field by field, so that a step of the history holds only what it changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+from gazeloc_app.state import Annotation
+from gazeloc_core.errors import InputError
+from gazeloc_core.keypoints import KeypointSet
+from gazeloc_core.methods import Method
+
+Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+CODECS: dict[str, Codec] = {
+    "keypoints": (KeypointSet.to_json, KeypointSet.from_json),
+    "method": (lambda method: method.value, Method),
+}
+"""To JSON and back, for fields that are not JSON themselves."""
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def changes_to_json(before: Annotation, after: Annotation) -> dict[str, Any]:
+    """The fields of `after` that differ from `before`."""
+    changed = (field.name for field in fields(Annotation) if getattr(before, field.name) != getattr(after, field.name))
+    return {name: CODECS.get(name, (_as_it_is, _as_it_is))[0](getattr(after, name)) for name in changed}
+
+
+def changed_from_json(before: Annotation, changes: Any) -> Annotation:
+    """`before` with the changes of `changes_to_json`.
+
+    Raises:
+        InputError: if they are garbled or of a later version.
+    """
+    try:
+        values = {name: CODECS.get(name, (_as_it_is, _as_it_is))[1](value) for name, value in changes.items()}
+        return replace(before, **values)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise InputError(f"A step of the history is garbled ({error}).") from error

@@ -1,0 +1,65 @@
+"""What a step of the history did, as a short sentence: told from the annotations before and after it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from gazeloc_app.state import Annotation
+from gazeloc_core.keypoints import KeypointPair, KeypointSet
+
+
+def describe(before: Annotation, after: Annotation) -> str:
+    """E.g. “Keypoint 3 placed on the scan”."""
+    found: list[str] = []
+    if before.keypoints != after.keypoints:
+        found.append(_keypoints(before.keypoints, after.keypoints))
+    if before.alignment != after.alignment:
+        found.append(f"Alignment {after.alignment} put in force" if after.alignment else "No alignment in force")
+    elif before.alignment_by_person != after.alignment_by_person:
+        found.append("Alignment chosen by a person" if after.alignment_by_person else "Alignment left to the run")
+    if before.method is not after.method:
+        found.append(f"Method {after.method} chosen")
+    told = {"keypoints", "alignment", "alignment_by_person", "method"}
+    others = (field.name for field in fields(Annotation) if field.name not in told)
+    found += [
+        f"{name.replace('_', ' ').capitalize()} changed"
+        for name in others
+        if getattr(before, name) != getattr(after, name)
+    ]
+    return "; ".join(found) or "Nothing changed"
+
+
+def _keypoints(before: KeypointSet, after: KeypointSet) -> str:
+    was, now = {pair.key: pair for pair in before}, {pair.key: pair for pair in after}
+    gone, new = [was[key] for key in was if key not in now], [now[key] for key in now if key not in was]
+    changed = [key for key in now if key in was and now[key] != was[key]]
+    if len(gone) + len(new) + len(changed) > 1:
+        counts = ((len(new), "added"), (len(changed), "changed"), (len(gone), "deleted"))
+        return "Keypoints: " + ", ".join(f"{count} {what}" for count, what in counts if count)
+    if gone:
+        return f"{gone[0].name} deleted"
+    if new:
+        return _change(KeypointPair(new[0].key, new[0].name), new[0])
+    return _change(was[changed[0]], now[changed[0]]) if changed else "Keypoints put in another order"
+
+
+def _change(was: KeypointPair, now: KeypointPair) -> str:
+    name = now.name
+    if was.name != now.name:
+        return f"{was.name} renamed to {name}"
+    if was.enabled != now.enabled:
+        return f"{name} {'counts again' if now.enabled else 'no longer counts'}"
+    if was.scan != now.scan or was.scan_sightings != now.scan_sightings:
+        clicked = len(now.scan_sightings) > len(was.scan_sightings)
+        return f"{name} {'clicked in the phone’s frame' if clicked else _placed(was.scan, now.scan) + ' on the scan'}"
+    if was.sfm != now.sfm or was.sightings != now.sightings:
+        if len(now.sightings) > len(was.sightings):
+            return f"{name} clicked in frame {now.sightings[-1].frame_index}"
+        return f"{name} {_placed(was.sfm, now.sfm)} in the reconstruction"
+    return f"{name} changed"
+
+
+def _placed(was: object, now: object) -> str:
+    if now is None:
+        return "taken away"
+    return "placed" if was is None else "moved"
