@@ -11,6 +11,7 @@ import json
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazeloc_core.arrays import Bytes, Floats
+from gazeloc_core.errors import InputError
 from gazeloc_core.scan import Mesh, Texture
 
 Rgb = tuple[int, int, int]
@@ -49,6 +51,25 @@ class Glb:
 
     document: dict[str, Any]
     binary: bytes
+
+    @classmethod
+    def from_bytes(cls, data: bytes, name: str) -> Glb:
+        """A .glb file that `to_bytes` wrote; `name` is for the sentence.
+
+        Raises:
+            InputError: if it is not one, or cut off.
+        """
+        try:
+            magic, version, total, text_size, _ = struct.unpack_from("<4sIII4s", data)
+            start = 20 + text_size
+            binary_size, kind = struct.unpack_from("<I4s", data, start)
+            document = json.loads(data[20:start])
+        except (struct.error, ValueError) as error:
+            raise InputError.of(Path(name), f"not a .glb file ({error})", "remove it, it is made again") from error
+        binary = data[start + 8 : start + 8 + binary_size]
+        if (magic, version, kind) != (b"glTF", 2, b"BIN\0") or total != len(data) or len(binary) != binary_size:
+            raise InputError.of(Path(name), "the .glb file is damaged", "remove it, it is made again")
+        return cls(document, binary)
 
     def to_bytes(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> bytes:
         """The .glb file with all colours multiplied (in linear light) by `tint`, and seen through by 1 - `opacity`.

@@ -46,6 +46,7 @@ from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.display import make_display
 
 log = logging.getLogger(__name__)
 
@@ -76,9 +77,9 @@ class App:
             undo.pop_all()
         self._browsers: dict[int, Browser] = {}
         self._last_job = 0
-        self.scene = SceneView(self.server, self.data, self._render)
-        self._build_panels()
+        self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch)
         self.store.add_view(self.scene.render)
+        self._build_panels()
         self.store.add_view(self._render_browsers)
         self.store.add_saver(self._saver.commit)
         self.store.add_effect(self._saver.settle)
@@ -130,7 +131,7 @@ class App:
         with tabs.add_tab("Figures"):
             figure_panel = FigurePanel(gui, self.data, dispatch)
         with tabs.add_tab("Layers"):
-            layer_panel = LayerPanel(gui, dispatch)
+            layer_panel = LayerPanel(gui, dispatch, self.scene.facts)
         with tabs.add_tab("Export"):
             export_panel = ExportPanel(gui, self.project.folder / "export", self.data, dispatch)
         side = gui.add_panel()
@@ -237,7 +238,8 @@ def _first_state(project: Project, saver: Saver) -> AppState:
 def _sources(project: Project) -> Sources:
     recordings = {name: partial(inputs.load_recording, project, name) for name in project.settings.recordings}
     tags = {name: partial(_seen_tags, project, name) for name in project.settings.recordings}
-    return Sources(mesh=partial(inputs.load_mesh, project), recordings=recordings, tags=tags)
+    mesh, display = partial(inputs.load_mesh, project), partial(make_display, project)
+    return Sources(mesh=mesh, recordings=recordings, tags=tags, make_display=display)
 
 
 def _seen_tags(project: Project, recording: str) -> SeenTags:

@@ -47,6 +47,8 @@ class Sources:
     recordings: Mapping[str, Callable[[], Recording]] = field(default_factory=dict)
     tags: Mapping[str, Callable[[], SeenTags]] = field(default_factory=dict)
     """What `Frame.with_tags` draws, by recording."""
+    make_display: Callable[[], object] | None = None
+    """Makes the scan fit for the screen and keeps it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +116,12 @@ class Description:
     note: str
 
 
-Job: TypeAlias = Render | Frame | Photo | Cast | Describe
+@dataclass(frozen=True, kw_only=True)
+class MakeDisplay:
+    """Make the scan fit for the screen and keep it in the project: None."""
+
+
+Job: TypeAlias = Render | Frame | Photo | Cast | Describe | MakeDisplay
 
 
 def work(pipe: Connection, sources: Sources) -> None:
@@ -159,6 +166,10 @@ class _Studio:
             case Describe():
                 renderer = self._pinhole_renderer()
                 return Description(renderer.by, renderer.note)
+            case MakeDisplay():
+                assert self._sources.make_display is not None
+                self._sources.make_display()
+                return None
 
     def _caster(self) -> Raycaster:
         if self._raycaster is None:

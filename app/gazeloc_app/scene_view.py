@@ -11,11 +11,13 @@ import numpy as np
 import viser
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
 from gazeloc_app.gaze_at import gaze_in_scan
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Frame
+from gazeloc_app.scan_screen import ScanScreen
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
 from gazeloc_app.scene.frusta import FrustaLayer
@@ -27,13 +29,12 @@ from gazeloc_app.scene.view import set_start
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.arrays import Bytes
 from gazeloc_core.camera import Camera
-from gazeloc_core.display_mesh import display_mesh
 from gazeloc_core.methods import Method
 from gazeloc_core.palette import colors_of_ids
+from gazeloc_core.scan_display import glimpse
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import facing
 
 GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
 METHOD_COLORS = {
@@ -51,6 +52,7 @@ FILTERED_OUT = (120, 120, 120)
 BACKGROUND = (233, 236, 239)
 """Light, but not white: holes in the scan are seen as holes, white walls as walls."""
 THUMBNAIL_PX = 320
+GLIMPSE_POINTS = 60_000
 MAX_FRUSTA = 400
 """More frusta of one set than this hide the room; a stride thins them out, the path shows all."""
 
@@ -58,14 +60,22 @@ MAX_FRUSTA = 400
 class SceneView:
     """All layers, and what each of them shows."""
 
-    def __init__(self, server: viser.ViserServer, data: ProjectData, render: RenderProcess):
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        data: ProjectData,
+        render: RenderProcess,
+        dispatch: Callable[[Action], None],
+    ):
         self._server, self._data, self._render = server, data, render
+        self._screen = ScanScreen(data, render, dispatch)
         scene = server.scene
         scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
         self._shown: dict[str, object] = {}
         self.front = 0
         """Which side of the scan's faces is drawn: 1 where their normals point to, -1 the other, 0 both."""
         self._room = RoomLayer(scene)
+        self._glimpse = CloudLayer(scene, "/scan-glimpse", point_size_m=0.015)
         self._cloud = CloudLayer(scene)
         self._tag_points = CloudLayer(scene, "/sfm/tag-points", point_size_m=0.022)
         self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
@@ -96,22 +106,34 @@ class SceneView:
         self._draw_frame(state, trajectory)
         self._show_and_hide(state)
 
+    def facts(self, state: AppState) -> tuple[str, ...]:
+        """Sentences about what is drawn with less than there is."""
+        found = []
+        display, model = self._screen.display(), self._data.model(state.recording)
+        if display is None:
+            found.append("The scan is being made fit for the screen; some of its points show meanwhile.")
+        elif display.faces < display.faces_of_scan:
+            found.append(f"{display.faces:,} of {display.faces_of_scan:,} triangles are drawn; clicks use all.")
+        if model is not None and self._cloud.drawn < len(model.points):
+            found.append(f"{self._cloud.drawn:,} of {len(model.points):,} points are drawn; clicks use all.")
+        return tuple(found)
+
     def _draw_scan(self, state: AppState) -> None:
         mesh = self._data.mesh()
         if self._shown.get("mesh") is not mesh:
             if "mesh" in self._shown:  # the scan got colours: the pictures of it are outdated
                 self._render.reopen()
             self._shown["mesh"] = mesh
-            frames = self._data.scan().frames
-            places = [np.asarray(frame.scan_from_camera.translation) for frame in frames] or [mesh.bounds.mean(axis=0)]
-            displayed = display_mesh(mesh)
-            turned, is_clear = facing(displayed, places)
-            self.front = (1 if turned is displayed else -1) if is_clear else 0
-            self._room.show(turned)
             set_start(self._server, mesh, self._data.scan().up_axis)
-            self._shown.pop("tint", None)
-        tint = state.layers.tint(Layer.SCAN)
-        self._once("tint", tint, lambda: self._room.set_look(tint or WHITE, two_sided=self.front == 0))
+        display = self._screen.display()
+        if display is not None:
+            self.front = display.front
+            self._glimpse.show(None, None)
+            self._room.set_look(state.layers.tint(Layer.SCAN) or WHITE, two_sided=self.front == 0)
+            self._room.show(display.glb)
+        elif "display" not in self._shown:
+            self._glimpse.show(*glimpse(mesh, GLIMPSE_POINTS))
+        self._shown["display"] = display
 
     def _draw_reconstruction(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
         model, tint = self._data.model(state.recording), state.layers.tint(Layer.POINTS)
@@ -214,7 +236,7 @@ class SceneView:
 
     def _show_and_hide(self, state: AppState) -> None:
         layers = {
-            Layer.SCAN: (self._room,),
+            Layer.SCAN: (self._room, self._glimpse),
             Layer.POINTS: (self._cloud,),
             Layer.SCAN_TAGS: (self._scan_tags,),
             Layer.SFM_TAGS: (self._sfm_tags,),

@@ -15,6 +15,7 @@ from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.glb import mesh_glb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.scan import Mesh, Texture
 from gazeloc_core.tag_types import TagCorners
@@ -61,11 +62,11 @@ def names(server):
 
 
 def test_the_room_is_sent_once_and_again_when_its_look_changes(server, sent):
-    layer = RoomLayer(server.scene)
-    layer.show(BOX)
+    layer, glb = RoomLayer(server.scene), mesh_glb(BOX)
+    layer.show(glb)
     assert ("GlbMessage", "/scan") in sent
     sent.clear()
-    layer.show(BOX)
+    layer.show(glb)
     layer.set_look()
     assert sent == []
     layer.set_visible(False)

@@ -19,6 +19,7 @@ from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.glb import mesh_glb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
@@ -67,7 +68,7 @@ def server():
     turned, is_clear = facing(mesh, [[2, 1.5, 1.3]])
     assert is_clear
     layer = RoomLayer(server.scene)
-    layer.show(turned)
+    layer.show(mesh_glb(turned))
     layer.set_look(two_sided=False)
     set_start(server, mesh, "z")
     server.gui.main_panel.dock_right()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gazeloc_app.state import AppState, Layer
+from gazeloc_app.state import AppState, Layer, Level
 
 
 @dataclass(frozen=True)
@@ -62,3 +62,14 @@ class NameRenderer:
     def apply(self, state: AppState) -> AppState:
         """The state with the sentence."""
         return replace(state, renderer_note=self.note)
+
+
+@dataclass(frozen=True)
+class ScanPrepared:
+    """The scan is ready for the screen: views look at it anew."""
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with that said; what else was said meanwhile stays."""
+        if state.notice is not None and state.notice.level is not Level.INFO:
+            return state
+        return state.noticed(Level.INFO, "The scan is ready.")

@@ -31,12 +31,15 @@ TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
 class LayerPanel:
     """A checkbox per layer; one colour field for the layer that is to be tinted."""
 
-    def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None]):
+    def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None], facts: Callable[[AppState], tuple[str, ...]]):
+        """`facts(state)` are sentences about what is drawn with less than there is."""
+        self._facts = facts
         self._boxes = {}
         for layer in Layer:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=HINTS[layer])
             widgets.on_user(box, partial(_show, dispatch, layer))
             self._boxes[layer] = box
+        self._note = gui.add_html("")
         with gui.add_folder("Tint", expand_by_default=False):
             self._which = gui.add_dropdown("Layer", tuple(layer.value for layer in TINTABLE))
             self._color = gui.add_rgb("Colour", (255, 160, 60))
@@ -50,6 +53,8 @@ class LayerPanel:
         """Show the state's layers."""
         for layer, box in self._boxes.items():
             widgets.set_value(box, state.layers.is_visible(layer))
+        facts = "<br>".join(widgets.text(fact) for fact in self._facts(state))
+        widgets.set_content(self._note, widgets.box(facts) if facts else "")
 
 
 def _show(dispatch: Callable[[Action], None], layer: Layer, event: Any) -> None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import viser
 
-from gazeloc_core.glb import WHITE, Glb, Rgb, mesh_glb
-from gazeloc_core.scan import Mesh
+from gazeloc_core.glb import WHITE, Glb, Rgb
 
 
 class RoomLayer:
-    """The scan at `/scan`. Give it a mesh fit for the browser (`display_mesh`), turned by `facing` where that is known.
+    """The scan at `/scan`, as `gazeloc_core.scan_display` makes it.
 
     Never attach a click handler to its node: that costs the browser 136 ms per mouse move at 1.5 million triangles.
     """
@@ -17,19 +16,16 @@ class RoomLayer:
     def __init__(self, scene: viser.SceneApi, name: str = "/scan"):
         self._scene = scene
         self._name = name
-        self._mesh: Mesh | None = None
         self._glb: Glb | None = None
         self._look: tuple[Rgb, float, bool] = (WHITE, 1.0, True)
         self._handle: viser.GlbHandle | None = None
         self._visible = True
 
-    def show(self, mesh: Mesh | None) -> None:
-        """Draw this mesh instead; None draws none."""
-        if mesh is self._mesh:
-            return
-        self._mesh = mesh
-        self._glb = None if mesh is None else mesh_glb(mesh)
-        self._draw()
+    def show(self, glb: Glb | None) -> None:
+        """Draw this instead; None draws nothing."""
+        if glb is not self._glb:
+            self._glb = glb
+            self._draw()
 
     def set_look(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> None:
         """Tint all colours, let the room be seen through, or hide faces from behind (`two_sided` False)."""
