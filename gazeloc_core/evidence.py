@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gazeloc_core.arrays import Bools, Floats
+from gazeloc_core.arrays import Bools, Floats, Ints
 from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.similarity_fit import leave_one_out, principal_extents, residuals, similarity_jacobian
@@ -171,23 +171,34 @@ def reprojection_px(scan_from_sfm: Similarity, pairs: Correspondences, model: Sf
 
     NaN where no image has. Walls are not considered: an image may have the place in view and not see it.
     """
-    scan_in_sfm = scan_from_sfm.inverse().apply(pairs.scan)
-    rotations, centres = model.sfm_from_camera.rotation.as_matrix(), model.sfm_from_camera.translation
+    sides = np.stack([pairs.sfm, scan_from_sfm.inverse().apply(pairs.scan)])
+    centres = np.asarray(model.sfm_from_camera.translation)
     order = np.argsort(np.linalg.norm(pairs.sfm[:, None] - centres, axis=2), axis=1)
     seen, sums = np.zeros(len(pairs)), np.zeros(len(pairs))
-    for rank in range(len(model)):
-        images = np.where(seen < nearest, order[:, rank], -1)
-        for image in np.unique(images[images >= 0]):
-            camera, rows = model.camera_of(int(image)), np.flatnonzero(images == image)
-            both = [
-                camera.project((side[rows] - centres[image]) @ rotations[image]) for side in (pairs.sfm, scan_in_sfm)
-            ]
-            ok = camera.contains(both[0]) & camera.contains(both[1])
-            sums[rows[ok]] += np.linalg.norm(both[0] - both[1], axis=1)[ok]
-            seen[rows[ok]] += 1
-        if (seen >= nearest).all():
+    for first in range(0, len(model), 4 * nearest):
+        rows = np.flatnonzero(seen < nearest)
+        if len(rows) == 0:
             break
+        apart = _apart_px(model, order[rows, first : first + 4 * nearest], sides[:, rows])
+        sees = np.isfinite(apart)
+        sees &= np.cumsum(sees, axis=1) + seen[rows, None] <= nearest
+        sums[rows] += np.where(sees, apart, 0.0).sum(axis=1)
+        seen[rows] += sees.sum(axis=1)
     return np.where(seen > 0, sums / np.maximum(seen, 1), np.nan)
+
+
+def _apart_px(model: SfmModel, images: Ints, sides: Floats) -> Floats:
+    """(K, C) pixels between two points each (2, K, 3) in the frame sfm, in `images` (K, C); NaN unless both are in."""
+    rotations, centres = model.sfm_from_camera.rotation.as_matrix(), model.sfm_from_camera.translation
+    in_camera = np.einsum("skci,kcij->skcj", sides[:, :, None] - centres[images], rotations[images])
+    apart = np.full(images.shape, np.nan)
+    cameras = model.image_camera_ids[images]
+    for camera_id in np.unique(cameras):
+        camera, here = model.cameras[int(camera_id)], cameras == camera_id
+        first, second = (camera.project(side[here]) for side in in_camera)
+        is_in = camera.contains(first) & camera.contains(second)
+        apart[here] = np.where(is_in, np.linalg.norm(first - second, axis=1), np.nan)
+    return apart
 
 
 def fit_covariance(points_in_scan: Floats, pairs: Correspondences, centre: Floats) -> Floats:

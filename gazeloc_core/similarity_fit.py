@@ -20,6 +20,8 @@ from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.transforms import Similarity
 
+_NO_WEIGHT = 1e-300
+"""Of pairs that are left out: nothing, but a sum of none of them can still be divided by."""
 COLLINEAR_RATIO = 0.02
 """Second to first singular value of centred points below which they count as lying on one line."""
 
@@ -55,7 +57,8 @@ def solve_umeyama(
 ) -> tuple[Floats, Floats, Floats]:
     """Scale (...), rotation (..., 3, 3) and translation (..., 3) that map `sfm` (..., K, 3) best to `scan`.
 
-    Weights are (..., K). With `mirrored` the best *reflection* is returned in place of the rotation.
+    Weights are (..., K); leading axes are broadcast. With `mirrored` the best *reflection* is returned in place of the
+    rotation.
     """
     w = weights / weights.sum(axis=-1, keepdims=True)
     mean_sfm = np.einsum("...k,...ki->...i", w, sfm)  # (34)
@@ -102,6 +105,8 @@ def check_geometry(pairs: Correspondences) -> None:
             "click more pairs, or record and scan more tags."
         )
     for points, side in ((pairs.scan, "scan"), (pairs.sfm, "reconstruction")):
+        if _determines(points, np.ones(len(points), dtype=np.bool_)):
+            continue
         extents = principal_extents(points)
         resolution = max(float(extents[0]), 1e-12 * float(np.abs(points).max(initial=1.0))) * 1e-4
         different = len(np.unique(np.round((points - points.mean(axis=0)) / resolution), axis=0))
@@ -110,20 +115,28 @@ def check_geometry(pairs: Correspondences) -> None:
                 f"The {len(points)} keypoints ({_list(pairs.names)}) are at {different} different places of the "
                 f"{side}, an alignment needs at least three; click them at different places."
             )
-        if extents[1] < COLLINEAR_RATIO * extents[0]:
-            raise GeometryError(
-                f"The {len(points)} keypoints ({_list(pairs.names)}) lie on one line of the {side}, around which the "
-                "room could turn freely; add one well away from that line."
-            )
+        raise GeometryError(
+            f"The {len(points)} keypoints ({_list(pairs.names)}) lie on one line of the {side}, around which the "
+            "room could turn freely; add one well away from that line."
+        )
+
+
+def _determines(points: Floats, kept: Bools) -> Bools:
+    """(...) whether the `kept` (..., K) of points (K, 3) lie at three places at least, and not on one line."""
+    count = kept.sum(axis=-1)
+    if points.shape[0] < 3:
+        return np.zeros(count.shape, dtype=np.bool_)
+    mean = kept @ points / np.maximum(count, 1)[..., None]
+    values = np.linalg.svd((points - mean[..., None, :]) * kept[..., None], compute_uv=False)
+    nothing = 1e-12 * float(np.abs(points).max(initial=1.0)) * np.sqrt(np.maximum(count, 1))
+    is_spread = (values[..., 0] > nothing) & (values[..., 1] >= COLLINEAR_RATIO * values[..., 0])
+    return np.asarray((count >= 3) & is_spread)
 
 
 def is_degenerate(pairs: Correspondences) -> bool:
     """Whether `check_geometry` refuses the pairs."""
-    try:
-        check_geometry(pairs)
-    except GeometryError:
-        return True
-    return False
+    everything = np.ones(len(pairs), dtype=np.bool_)
+    return not all(bool(_determines(side, everything)) for side in (pairs.scan, pairs.sfm))
 
 
 def similarity_jacobian(points_in_scan: Floats, centre: Floats) -> Floats:
@@ -145,12 +158,9 @@ def residuals(scan_from_sfm: Similarity, pairs: Correspondences) -> Floats:
 
 def normalised_by_group(distances: Floats, pairs: Correspondences) -> Floats:
     """(..., G) root mean square of `distances` (..., K) over each group, in units of the expected error."""
-    squares = (distances / pairs.sigma_m) ** 2
     size = np.bincount(pairs.group_index)
-    sums = np.zeros((*distances.shape[:-1], len(size)))
-    for point, group in enumerate(pairs.group_index):
-        sums[..., group] += squares[..., point]
-    return np.asarray(np.sqrt(sums / size), dtype=np.float64)
+    member = np.arange(len(size)) == pairs.group_index[:, None]
+    return np.asarray(np.sqrt((distances / pairs.sigma_m) ** 2 @ (member / size)), dtype=np.float64)
 
 
 def robust_fit(pairs: Correspondences, options: RobustOptions | None = None) -> RobustFit:
@@ -180,36 +190,42 @@ def robust_fit(pairs: Correspondences, options: RobustOptions | None = None) -> 
 
 def leave_one_out(pairs: Correspondences, inlier: Bools) -> tuple[Similarity | None, ...]:
     """For each group the similarity fitted without it, None where the rest does not determine one."""
-    fits: list[Similarity | None] = []
-    for group in range(len(pairs.group_names)):
-        rest = pairs.take(inlier & ~pairs.of_group(group))
-        fits.append(None if is_degenerate(rest) else fit_similarity(rest.sfm, rest.scan, rest.weights))
-    return tuple(fits)
+    kept = inlier & (np.arange(len(pairs.group_names))[:, None] != pairs.group_index)
+    is_determined = _determines(pairs.scan, kept) & _determines(pairs.sfm, kept)
+    scale, rotation, shift = solve_umeyama(pairs.sfm, pairs.scan, np.where(kept, pairs.weights, _NO_WEIGHT))
+    return tuple(
+        Similarity(float(scale[group]), Rotation.from_matrix(rotation[group]), shift[group])
+        if is_determined[group]
+        else None
+        for group in range(len(kept))
+    )
 
 
 def _best_proposals(pairs: Correspondences, options: RobustOptions, count: int = 10) -> list[Floats]:
     """Normalised group errors (G,) under the best of the similarities that small sets of groups propose."""
-    proposals: list[tuple[float, Floats]] = []
-    for groups in _subsets(len(pairs.group_names), options):
-        chosen = np.flatnonzero(np.isin(pairs.group_index, groups))
-        if min(principal_extents(side[chosen])[1] for side in (pairs.sfm, pairs.scan)) < 1e-9:
-            continue
-        scale, rotation, shift = solve_umeyama(pairs.sfm[chosen], pairs.scan[chosen], pairs.weights[chosen])
-        mapped = scale * pairs.sfm @ rotation.T + shift
-        errors = normalised_by_group(np.linalg.norm(mapped - pairs.scan, axis=1), pairs)
-        proposals.append((_cost(errors, options.inlier_sigmas * options.max_inflation), errors))
-    return [errors for _, errors in sorted(proposals, key=lambda proposal: proposal[0])[:count]]
+    subsets = _subsets(len(pairs.group_names), options)
+    is_chosen = np.zeros((len(subsets), len(pairs.group_names)), dtype=np.bool_)
+    np.put_along_axis(is_chosen, subsets, True, axis=1)
+    weights = np.where(is_chosen[:, pairs.group_index], pairs.weights, 0.0)
+    scale, rotation, shift = solve_umeyama(pairs.sfm, pairs.scan, weights)
+    mapped = scale[:, None, None] * (pairs.sfm @ np.swapaxes(rotation, 1, 2)) + shift[:, None]
+    errors = normalised_by_group(np.linalg.norm(mapped - pairs.scan, axis=2), pairs)
+    errors = np.where(np.isfinite(errors), errors, np.inf)  # three groups at one place propose nothing
+    limit = options.inlier_sigmas * options.max_inflation
+    best = np.argsort((np.minimum(errors, limit) ** 2).sum(axis=1), kind="stable")[:count]
+    return list(errors[best])
 
 
 def _cost(errors: Floats, limit: float) -> float:
     return float((np.minimum(errors, limit) ** 2).sum())
 
 
-def _subsets(count: int, options: RobustOptions) -> list[Ints]:
+def _subsets(count: int, options: RobustOptions) -> Ints:
+    """(S, 3) sets of groups."""
     if comb(count, 3) <= options.max_subsets:
-        return [np.array(subset) for subset in combinations(range(count), 3)]
+        return np.array(list(combinations(range(count), 3)), dtype=np.int64)
     rng = np.random.default_rng(options.seed)
-    return [rng.choice(count, 3, replace=False) for _ in range(options.max_subsets)]
+    return np.argpartition(rng.random((options.max_subsets, count)), 3, axis=1)[:, :3].astype(np.int64)
 
 
 def _agreeing(errors: Floats, pairs: Correspondences, options: RobustOptions) -> tuple[Bools, float] | None:

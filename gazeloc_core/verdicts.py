@@ -53,7 +53,7 @@ def verdicts_on(evidence: Evidence, pairs: Correspondences, options: VerdictOpti
 
 def is_mirrored(pairs: Correspondences) -> bool:
     """Whether a mirror image fits the pairs far better than any turn does, beyond what errors explain."""
-    proper, reflected = (_rms_error(pairs, pairs.scan, mirrored) for mirrored in (False, True))
+    proper, reflected = (float(_rms_error(pairs, pairs.scan, mirrored)) for mirrored in (False, True))
     return proper > 3.4 and reflected < 0.3 * proper
 
 
@@ -66,23 +66,29 @@ def best_swap(pairs: Correspondences) -> tuple[str, str] | None:
     groups = [np.flatnonzero(pairs.of_group(g)) for g in range(len(pairs.group_names))]
     if before <= 3.4 or not 4 <= len(groups) <= 40:
         return None
-    best, named = 0.35 * before, None
-    for first, second in combinations(range(len(groups)), 2):
-        if len(groups[first]) != len(groups[second]):
-            continue
-        scan = pairs.scan.copy()
-        scan[groups[first]], scan[groups[second]] = pairs.scan[groups[second]], pairs.scan[groups[first]]
-        error = _rms_error(pairs, scan, mirrored=False)
-        if error < best:
-            best, named = error, (pairs.group_names[first], pairs.group_names[second])
-    return named
+    same_size = [(a, b) for a, b in combinations(range(len(groups)), 2) if len(groups[a]) == len(groups[b])]
+    if not same_size:
+        return None
+    scans = np.repeat(pairs.scan[None], len(same_size), axis=0)
+    for scan, (a, b) in zip(scans, same_size, strict=True):
+        scan[groups[a]], scan[groups[b]] = pairs.scan[groups[b]], pairs.scan[groups[a]]
+    errors = _rms_error(pairs, scans, mirrored=False)
+    best = int(errors.argmin())
+    if errors[best] >= 0.35 * before:
+        return None
+    first, second = same_size[best]
+    return pairs.group_names[first], pairs.group_names[second]
 
 
-def _rms_error(pairs: Correspondences, scan: Floats, mirrored: bool) -> float:
-    """Root mean square over groups of the residual in expected errors, after the best fit to all pairs."""
+def _rms_error(pairs: Correspondences, scan: Floats, mirrored: bool) -> Floats:
+    """Root mean square over groups of the residual in expected errors, after the best fit to all pairs.
+
+    `scan` is (..., K, 3), the answer (...).
+    """
     scale, rotation, shift = solve_umeyama(pairs.sfm, scan, pairs.weights, mirrored=mirrored)
-    distance = np.linalg.norm(scale * pairs.sfm @ rotation.T + shift - scan, axis=1)
-    return float(np.sqrt(np.mean(normalised_by_group(distance, pairs) ** 2)))
+    mapped = scale[..., None, None] * (pairs.sfm @ np.swapaxes(rotation, -1, -2)) + shift[..., None, :]
+    errors = normalised_by_group(np.linalg.norm(mapped - scan, axis=-1), pairs)
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=-1)))
 
 
 def _on_swaps(pairs: Correspondences, evidence: Evidence) -> list[Verdict]:
