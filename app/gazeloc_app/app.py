@@ -24,6 +24,7 @@ from gazeloc_app.actions.views import NameRenderer, ShowFrame
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.jobs import JobRunner
+from gazeloc_app.live_alignment import LiveAlignment
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
@@ -70,6 +71,7 @@ class App:
             self._saver = Saver(project, self._say_damage)
             self.store = Store(_first_state(project, self._saver), batch=lambda: self.server.atomic())
             self.data.recording(self.store.state.recording)
+            self.live = LiveAlignment(self.data, self.store.dispatch)
             self.jobs = JobRunner(project.folder, self.store.dispatch)
             self._render = RenderProcess(_sources(project), self._say_trouble)
             undo.callback(self._render.close)
@@ -84,6 +86,7 @@ class App:
         self.store.add_saver(self._saver.commit)
         self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
+        self.store.add_effect(self.live.follow)
         self.store.add_effect(self._show_first_pose)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
@@ -92,6 +95,7 @@ class App:
         """Render everything and start the loop; load what the first click and the first picture need."""
         self._go_to_first_pose(self.store.state)
         self.store.start()
+        self.live.start()
         threading.Thread(target=self._warm_up, name="gazeloc-warm-up", daemon=True).start()
         colors = pipeline.stage_named("colors", of_scan=True)
         if colors.is_needed(self.project) and not colors.artifact(self.project, "").exists:
@@ -99,6 +103,7 @@ class App:
 
     def stop(self) -> None:
         """End the loop, the worker processes and the server, and let others write to the project."""
+        self.live.stop()
         self.store.stop()
         self.jobs.stop()
         self._render.close()

@@ -114,6 +114,12 @@ class AppState:
     layers: LayerSettings = field(default_factory=LayerSettings)
     compared: frozenset[Method] = frozenset()
     """Methods whose poses show in the scene beside those of the method that was chosen."""
+    is_live: bool = True
+    """Whether people want the alignment to follow the keypoints (see `live_alignment.is_following`)."""
+    live_asked: int = 0
+    """Counts how often a person switched that on, which fits the keypoints at once."""
+    fit_note: str = ""
+    """Why the last change of the keypoints gave no alignment; "" where it did."""
     draws_tags: bool = False
     """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None

@@ -53,7 +53,7 @@ def align_keypoints(
     Raises:
         GeometryError: if there are too few keypoints, or they do not determine an alignment.
     """
-    options = options or _align_options(project)
+    options = options or align_options(project)
     report(0.1, "fitting the keypoints")
     pairs = correspondences(project, recording)
     groups = len(pairs.group_names)
@@ -95,7 +95,8 @@ def _why_no_keypoints(project: Project, recording: str) -> str:
     )
 
 
-def _align_options(project: Project) -> AlignOptions:
+def align_options(project: Project) -> AlignOptions:
+    """How a project's keypoints are aligned: with the known size of its tags."""
     tags = project.settings.tags
     return AlignOptions(tag_size_m=tags.size_m if tags else None)
 
@@ -143,7 +144,7 @@ def refine_alignment(
 
     `start` is the key to start from; without it the one that the stage `alignment` made.
     """
-    options = options or RefineOptions(align=_align_options(project))
+    options = options or RefineOptions(align=align_options(project))
     key = start or fitted_alignment(project, recording)
     refinement = refine(
         load_alignment(project, recording, key),

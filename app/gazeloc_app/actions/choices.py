@@ -18,6 +18,7 @@ class ChooseAlignment:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
+        state = replace(state, is_live=self.key is None, fit_note="")  # what is chosen stays, whatever is clicked next
         return state.annotate(replace(state.annotation, alignment=self.key, alignment_by_person=self.key is not None))
 
 

@@ -11,11 +11,15 @@ from gazeloc_app import tasks, widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.jobs import StartJob
+from gazeloc_app.actions.live import FollowKeypoints
 from gazeloc_app.data import ProjectData
+from gazeloc_app.live_alignment import is_following
 from gazeloc_app.state import AppState, Level
-from gazeloc_core.alignment import Alignment
+from gazeloc_core.alignment import Alignment, AlignmentMethod
 
 NONE = "(none)"
+NEWEST_FITS = 6
+"""So many fits to keypoints are listed; a click makes a new one each."""
 METHODS = {
     "keypoints": "keypoints",
     "icp-point-to-point": "ICP, point to point",
@@ -35,14 +39,22 @@ class AlignmentPanel:
         self._seen: object = None
         self._keys: dict[str, str | None] = {NONE: None}
         self._align = gui.add_button("Align", hint="Fits the tags' corners and the keypoints that count.")
+        self._live = gui.add_checkbox(
+            "Follow the keypoints",
+            True,
+            hint="Fits anew at every change of the keypoints, without a button; undo takes both back. Off while an "
+            "alignment of ICP or one that was chosen below is in force: switched on, the fit takes its place.",
+        )
+        self._note = gui.add_html("")
         self._refine = gui.add_button(
             "Refine with ICP",
             color="gray",
             hint="Both variants are shown; the better one is used only if keypoints that ICP did not use say so.",
         )
-        self._chosen = gui.add_dropdown("In force", (NONE,), hint="All alignments that were ever made; undo works.")
+        self._chosen = gui.add_dropdown("In force", (NONE,), hint="Of fits to keypoints the newest; undo works.")
         self._evidence = gui.add_html("")
         widgets.on_user(self._align, lambda _: self._start("Align", tasks.align), event="on_click")
+        widgets.on_user(self._live, lambda event: dispatch(FollowKeypoints(bool(event.target.value))))
         widgets.on_user(self._refine, lambda _: self._start_refinement(), event="on_click")
         widgets.on_user(self._chosen, lambda event: self._choose(str(event.target.value)))
 
@@ -51,11 +63,13 @@ class AlignmentPanel:
         self._state = state
         for handle in (self._align, self._refine):
             widgets.set_property(handle, "disabled", state.job is not None)
+        widgets.set_value(self._live, is_following(self._data, state))
+        widgets.set_content(self._note, _note_html(state.fit_note))
         seen = (state.recording, state.annotation.alignment, state.data_revision)
         if seen == self._seen:
             return
         self._seen = seen
-        alignments = self._data.alignments(state.recording)
+        alignments = _worth_listing(self._data.alignments(state.recording), state.annotation.alignment)
         self._keys = {NONE: None} | {_label(alignment): alignment.key for alignment in alignments}
         options = tuple(self._keys)
         if tuple(self._chosen.options) != options:
@@ -99,6 +113,19 @@ class AlignmentPanel:
             self._dispatch(Notify(Level.WARNING, "ICP needs a start: align by tags or keypoints first."))
         else:
             self._start("Refine with ICP", tasks.refine, start=key)
+
+
+def _worth_listing(alignments: list[Alignment], in_force: str | None) -> list[Alignment]:
+    """Without fits that were passed through while keypoints were clicked: of fits the newest, and the one in force."""
+    fits = [alignment.key for alignment in alignments if alignment.method is AlignmentMethod.KEYPOINTS]
+    passed = set(fits[:-NEWEST_FITS]) - {in_force}
+    return [alignment for alignment in alignments if alignment.key not in passed]
+
+
+def _note_html(note: str) -> str:
+    if not note:
+        return ""
+    return widgets.box(widgets.colored(f"The keypoints as they are now give no alignment: {note}", widgets.WARNING))
 
 
 def _label(alignment: Alignment) -> str:

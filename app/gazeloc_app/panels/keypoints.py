@@ -21,6 +21,11 @@ RULES = (
     "(reconstructions blur edges); far apart from each other, in all directions. Three pairs at least, six are better."
 )
 
+LEGEND = (
+    f'<div style="color:{widgets.MUTED}">cm and px: how far the two sides are apart. left out: the same in cm where '
+    "the others alone decide. moves: by how many cm the cameras move without the pair. ✗: it disagrees, not used.</div>"
+)
+
 
 class KeypointPanel:
     """The table of pairs, the selection, and undo and redo."""
@@ -65,7 +70,8 @@ class KeypointPanel:
         keypoints = state.annotation.keypoints
         residuals = pair_residuals(self._data, state)
         rows = [_row(pair, residuals.get(pair.key), pair.key == state.selected_key) for pair in keypoints]
-        table = widgets.html_table(["", "Name", "Scan", "SfM", "cm", "px"], rows) if rows else "No pair yet."
+        head = ["", "Name", "Scan", "SfM", "cm", "px", "left out", "moves"]
+        table = f"{widgets.html_table(head, rows)}{LEGEND if residuals else ''}" if rows else "No pair yet."
         widgets.set_content(self._table, widgets.box(f'<div id="gazeloc-pairs">{table}</div>'))
         selected = keypoints.get(state.selected_key) if state.selected_key else None
         options = (NEW, *(_label(pair) for pair in keypoints))
@@ -102,6 +108,21 @@ def _row(pair: KeypointPair, residual: PairResidual | None, is_selected: bool) -
         f"<b>{name}</b>" if is_selected else name,
         _side(pair.scan, pair.scan_sightings),
         _side(pair.sfm, pair.sightings),
-        f"{100 * residual.distance_m:.1f}" if residual else "",
-        f"{residual.pixels:.0f}" if residual and residual.pixels is not None else "",
+        *_numbers(residual),
     ]
+
+
+def _numbers(residual: PairResidual | None) -> list[str]:
+    if residual is None:
+        return ["", "", "", ""]
+    distance = f"{100 * residual.distance_m:.1f}"
+    return [
+        distance if residual.is_used else f"{widgets.colored(distance, widgets.BAD)} ✗",
+        f"{residual.pixels:.0f}" if residual.pixels is not None else "",
+        _cm(residual.left_out_m),
+        _cm(residual.cameras_move_m),
+    ]
+
+
+def _cm(value_m: float | None) -> str:
+    return "" if value_m is None else f"{100 * value_m:.1f}"

@@ -1,0 +1,45 @@
+"""What each keypoint does to an alignment: the least-squares fit with it against the fit without it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gazeloc_core.arrays import Bools, Floats
+from gazeloc_core.correspondences import Correspondences
+from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.similarity_fit import leave_one_out, residuals
+from gazeloc_core.transforms import Similarity
+
+
+@dataclass(frozen=True, eq=False)
+class PairEffects:
+    """By group of pairs (G,), in the order of `Correspondences.group_names`; NaN where the others determine no fit.
+
+    `left_out_m`: how far the group is from where the fit to all others puts it (root mean square over its points).
+    `cameras_move_m`: how far the cameras move, on average, when the group is left out; 0 for one that does not count.
+    """
+
+    left_out_m: Floats
+    cameras_move_m: Floats
+
+
+def pair_effects(
+    scan_from_sfm: Similarity, pairs: Correspondences, inlier: Bools, model: SfmModel | None
+) -> PairEffects:
+    """The effects under an alignment fitted to the inliers (K,) of the pairs; without a model no camera moves."""
+    count = len(pairs.group_names)
+    left_out, moved = np.full(count, np.nan), np.full(count, np.nan)
+    centres = np.zeros((0, 3)) if model is None else np.asarray(model.sfm_from_camera.translation).reshape(-1, 3)
+    here = scan_from_sfm.apply(centres)
+    for group, fit in enumerate(leave_one_out(pairs, inlier)):
+        if fit is None:
+            continue
+        members = pairs.of_group(group)
+        left_out[group] = np.sqrt(np.mean(residuals(fit, pairs.take(members)) ** 2))
+        if not (inlier & members).any():
+            moved[group] = 0.0
+        elif len(centres):
+            moved[group] = np.linalg.norm(fit.apply(centres) - here, axis=1).mean()
+    return PairEffects(left_out, moved)
