@@ -136,11 +136,17 @@ def lines_glb(segments: ArrayLike, colors: ArrayLike) -> Glb:
     return writer.finish()
 
 
-def polyline_segments(points: ArrayLike) -> Floats:
-    """The segments (N - 1, 2, 3) between successive `points` (N, 3), without those that a NaN row interrupts."""
-    p = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-    segments = np.stack([p[:-1], p[1:]], axis=1)
-    return segments[np.isfinite(segments).all(axis=(1, 2))]
+def wires_glb(points: Floats, edges: NDArray[np.int64], colors: Bytes) -> Glb:
+    """Lines one pixel wide between `points` (V, 3) with sRGB `colors` (V, 3): `edges` (E, 2) of their rows, E > 0.
+
+    A third of the bytes of `lines_glb` where lines share their ends, as in pyramids and paths.
+    """
+    assert len(edges) > 0, "no line to draw"
+    writer = _Writer()
+    attributes = {"POSITION": writer.add_positions(points), "COLOR_0": writer.add_colors(colors)}
+    indices = writer.add(edges.astype(np.uint32).ravel(), _UINT, "SCALAR", _INDEX_BUFFER)
+    writer.add_primitive(attributes, writer.add_material(WHITE), _LINES, indices)
+    return writer.finish()
 
 
 class _Writer:

@@ -26,6 +26,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
 from gazeloc_app.panels.alignment import AlignmentPanel
+from gazeloc_app.panels.camera_colors import CameraColors
 from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.frames import FramePanel
@@ -137,6 +138,7 @@ class App:
             figure_panel = FigurePanel(gui, self.data, dispatch)
         with tabs.add_tab("Layers"):
             layer_panel = LayerPanel(gui, dispatch, self.scene.facts)
+            camera_colors = CameraColors(gui, self.scene.cameras, dispatch)
         with tabs.add_tab("Export"):
             export_panel = ExportPanel(gui, self.project.folder / "export", self.data, dispatch)
         side = gui.add_panel()
@@ -145,7 +147,7 @@ class App:
         side.dock_left()
         side.set_width(430)
         work = (project_panel, keypoint_panel, alignment_panel)
-        looks = (method_panel, figure_panel, layer_panel, export_panel, frame_panel)
+        looks = (method_panel, figure_panel, layer_panel, camera_colors, export_panel, frame_panel)
         for panel in (job_bar, *work, *looks):
             self.store.add_view(panel.render)
 

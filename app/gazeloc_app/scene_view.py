@@ -14,37 +14,28 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
 from gazeloc_app.gaze_at import gaze_in_scan
+from gazeloc_app.once import Once
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Frame
 from gazeloc_app.scan_screen import ScanScreen
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
-from gazeloc_app.scene.frusta import FrustaLayer
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
+from gazeloc_app.scene_cameras import SceneCameras
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.camera import Camera
-from gazeloc_core.methods import Method
 from gazeloc_core.palette import colors_of_ids
+from gazeloc_core.scan import Mesh
 from gazeloc_core.scan_display import glimpse
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
 
-GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
-METHOD_COLORS = {
-    Method.SFM: (130, 60, 200),
-    Method.SFM_PAPER: (240, 140, 0),
-    Method.TAGS: (0, 150, 150),
-    Method.TAGS_PAPER: (130, 90, 50),
-    Method.GLOBAL: (215, 60, 175),
-}
-"""Of methods that are compared with the chosen one, which is always red."""
 SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
 WHITE = (255, 255, 255)
 FILTERED_OUT = (120, 120, 120)
@@ -53,8 +44,6 @@ BACKGROUND = (233, 236, 239)
 """Light, but not white: holes in the scan are seen as holes, white walls as walls."""
 THUMBNAIL_PX = 320
 GLIMPSE_POINTS = 60_000
-MAX_FRUSTA = 400
-"""More frusta of one set than this hide the room; a stride thins them out, the path shows all."""
 
 
 class SceneView:
@@ -71,7 +60,8 @@ class SceneView:
         self._screen = ScanScreen(data, render, dispatch)
         scene = server.scene
         scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
-        self._shown: dict[str, object] = {}
+        self._once = Once()
+        self._mesh: Mesh | None = None
         self.front = 0
         """Which side of the scan's faces is drawn: 1 where their normals point to, -1 the other, 0 both."""
         self._room = RoomLayer(scene)
@@ -80,12 +70,7 @@ class SceneView:
         self._tag_points = CloudLayer(scene, "/sfm/tag-points", point_size_m=0.022)
         self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
         self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
-        self._phone = FrustaLayer(scene, "phone", BLUE, depth_m=0.08)
-        self._truth = FrustaLayer(scene, "truth", GREEN)
-        self._estimate = FrustaLayer(scene, "estimate", RED)
-        self._compared = {
-            method: FrustaLayer(scene, f"methods/{method}", METHOD_COLORS[method], depth_m=0.09) for method in Method
-        }
+        self.cameras = SceneCameras(scene, data)
         self._keypoints = KeypointsLayer(scene)
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
@@ -97,7 +82,7 @@ class SceneView:
         self._draw_scan(state)
         self._draw_reconstruction(state, scan_from_sfm)
         self._draw_tags(state, scan_from_sfm)
-        self._draw_cameras(state, trajectory)
+        self.cameras.render(state)
         self._once(
             "keypoints",
             (state.annotation.keypoints, state.selected_key, scan_from_sfm),
@@ -120,10 +105,10 @@ class SceneView:
 
     def _draw_scan(self, state: AppState) -> None:
         mesh = self._data.mesh()
-        if self._shown.get("mesh") is not mesh:
-            if "mesh" in self._shown:  # the scan got colours: the pictures of it are outdated
+        if mesh is not self._mesh:
+            if self._mesh is not None:  # the scan got colours: the pictures of it are outdated
                 self._render.reopen()
-            self._shown["mesh"] = mesh
+            self._mesh = mesh
             set_start(self._server, mesh, self._data.scan().up_axis)
         display = self._screen.display()
         if display is not None:
@@ -131,9 +116,8 @@ class SceneView:
             self._glimpse.show(None, None)
             self._room.set_look(state.layers.tint(Layer.SCAN) or WHITE, two_sided=self.front == 0)
             self._room.show(display.glb)
-        elif "display" not in self._shown:
-            self._glimpse.show(*glimpse(mesh, GLIMPSE_POINTS))
-        self._shown["display"] = display
+        elif self._room.is_empty:
+            self._once("glimpse", mesh, lambda: self._glimpse.show(*glimpse(mesh, GLIMPSE_POINTS)))
 
     def _draw_reconstruction(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
         model, tint = self._data.model(state.recording), state.layers.tint(Layer.POINTS)
@@ -168,50 +152,6 @@ class SceneView:
         place = None if scan_from_sfm is None else _numbers(scan_from_sfm)
         self._once("sfm tags", (in_sfm, place), lambda: self._sfm_tags.show(in_sfm, scan_from_sfm))
 
-    def _draw_cameras(self, state: AppState, trajectory: Trajectory | None) -> None:
-        scan, camera = self._data.scan(), self._data.camera(state.recording)
-        phone_tint = state.layers.tint(Layer.PHONE)
-        self._once(
-            "phone",
-            (scan, phone_tint),
-            lambda: self._show_frusta(
-                self._phone, _phone_poses(scan.frames), scan.frames[0].camera if scan.frames else None, phone_tint
-            ),
-        )
-        truth, truth_tint = self._data.true_keyframes(state.recording), state.layers.tint(Layer.TRUTH)
-        self._once(
-            "truth",
-            (truth, camera, truth_tint),
-            lambda: self._show_frusta(self._truth, truth, camera, truth_tint),
-        )
-        tint = state.layers.tint(Layer.ESTIMATE)
-        self._once(
-            "estimate",
-            (trajectory, camera, tint),
-            lambda: self._show_frusta(self._estimate, _localised_poses(trajectory), camera, tint),
-        )
-
-        self._draw_compared(state, camera)
-
-    def _draw_compared(self, state: AppState, camera: Camera | None) -> None:
-        for method, layer in self._compared.items():
-            is_shown = method in state.compared and method is not state.annotation.method
-            key = self._data.poses_key(state.recording, state.annotation, method) if is_shown else None
-            poses = _localised_poses(self._data.trajectory(state.recording, key)) if key is not None else None
-            self._once(
-                f"compared {method}",
-                (state.recording, key, camera),
-                lambda layer=layer, poses=poses: self._show_frusta(layer, poses, camera, None),  # type: ignore[misc]
-            )
-
-    def _show_frusta(
-        self, layer: FrustaLayer, poses: RigidTransform | None, camera: Any, tint: tuple[int, int, int] | None
-    ) -> None:
-        if camera is not None and not camera.is_pinhole:
-            camera = None
-        count = 0 if poses is None or camera is None else len(poses)
-        layer.show(poses if count else None, camera, stride=max(1, -(-count // MAX_FRUSTA)), colors=tint)
-
     def _draw_frame(self, state: AppState, trajectory: Trajectory | None) -> None:
         camera = self._data.camera(state.recording)
         pose = None
@@ -231,7 +171,7 @@ class SceneView:
         self._once("frame", key, show)
 
     def _paste(self, key: object, pose: RigidTransform, camera: Any, image: Bytes) -> None:
-        if self._shown.get("frame") == key:  # another frame may have been chosen while this one was decoded
+        if self._once.last("frame") == key:  # another frame may have been chosen while this one was decoded
             self._selected.show(pose, camera, image)
 
     def _show_and_hide(self, state: AppState) -> None:
@@ -240,12 +180,13 @@ class SceneView:
             Layer.POINTS: (self._cloud,),
             Layer.SCAN_TAGS: (self._scan_tags,),
             Layer.SFM_TAGS: (self._sfm_tags,),
-            Layer.PHONE: (self._phone,),
-            Layer.TRUTH: (self._truth,),
-            Layer.ESTIMATE: (self._estimate, self._selected, *self._compared.values()),
+            Layer.PHONE: (self.cameras.phone,),
+            Layer.TRUTH: (self.cameras.truth,),
+            Layer.ESTIMATE: (self.cameras.estimate, self._selected, *self.cameras.compared.values()),
             Layer.KEYPOINTS: (self._keypoints,),
             Layer.TAG_POINTS: (self._tag_points,),
             Layer.GAZE: (self._gaze,),
+            Layer.ERRORS: (self.cameras.errors,),
         }
         for layer, parts in layers.items():
             is_visible = state.layers.is_visible(layer)
@@ -256,11 +197,6 @@ class SceneView:
                     part.set_visible(on) for part in parts
                 ],
             )
-
-    def _once(self, name: str, shown: object, draw: Callable[[], object]) -> None:
-        if name not in self._shown or self._shown[name] != shown:
-            self._shown[name] = shown
-            draw()
 
 
 def when_picture(use: Callable[[Bytes], None]) -> Callable[[Future[Any]], None]:
@@ -276,13 +212,3 @@ def when_picture(use: Callable[[Bytes], None]) -> Callable[[Future[Any]], None]:
 
 def _numbers(similarity: Similarity) -> tuple[float, ...]:
     return tuple(similarity.as_matrix().ravel().tolist())
-
-
-def _phone_poses(frames: Any) -> RigidTransform | None:
-    return RigidTransform.concatenate([frame.scan_from_camera for frame in frames]) if frames else None
-
-
-def _localised_poses(trajectory: Trajectory | None) -> RigidTransform | None:
-    if trajectory is None or not trajectory.is_localised.any():
-        return None
-    return trajectory.poses(trajectory.localised_keyframes)

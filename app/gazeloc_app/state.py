@@ -28,6 +28,15 @@ class Layer(StrEnum):
     KEYPOINTS = "Keypoints"
     TAG_POINTS = "Points under tags"
     GAZE = "Gaze"
+    ERRORS = "Errors"
+
+
+class Coloring(StrEnum):
+    """What the colours of the recording's cameras stand for."""
+
+    SET = "method"
+    STATUS = "status"
+    ERROR = "error"
 
 
 class Level(StrEnum):
@@ -76,8 +85,11 @@ class Annotation:
 class LayerSettings:
     """Which layers show, and how they are tinted (RGB; None for a layer's own colours)."""
 
-    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS})
+    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS})
     tints: tuple[tuple[Layer, tuple[int, int, int]], ...] = ()
+    coloring: Coloring = Coloring.SET
+    thinning: int | None = None
+    """Every how many of the recording's cameras one is drawn; None leaves it to their number."""
 
     def is_visible(self, layer: Layer) -> bool:
         """Whether a layer shows."""

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from gazeloc_core.display_mesh import display_mesh
-from gazeloc_core.glb import linear_from_srgb, lines_glb, mesh_glb, polyline_segments
+from gazeloc_core.glb import linear_from_srgb, lines_glb, mesh_glb, wires_glb
 from gazeloc_core.scan import Mesh, Texture
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0.5]])
@@ -137,9 +137,15 @@ def test_lines_take_one_colour_or_one_per_line_or_per_end(shape):
     np.testing.assert_allclose(stored, linear_from_srgb(expected), atol=1e-5)
 
 
-def test_a_polyline_has_a_gap_where_the_trajectory_has_one():
-    points = np.array([[0, 0, 0], [1, 0, 0], [np.nan] * 3, [2, 0, 0], [3, 0, 0]])
-    np.testing.assert_array_equal(polyline_segments(points)[:, :, 0], [[0, 1], [2, 3]])
+def test_wires_share_their_ends_and_keep_each_colour():
+    colors = np.array([[1, 2, 3], [9, 8, 7], [200, 0, 50], [0, 0, 0]], np.uint8)
+    document, binary = parts(wires_glb(VERTICES, np.array([[0, 1], [1, 2], [2, 0]]), colors).to_bytes())
+    primitive = document["meshes"][0]["primitives"][0]
+    assert primitive["mode"] == 1
+    assert accessor(document, binary, primitive["indices"]).ravel().tolist() == [0, 1, 1, 2, 2, 0]
+    np.testing.assert_allclose(accessor(document, binary, primitive["attributes"]["POSITION"]), VERTICES)
+    stored = accessor(document, binary, primitive["attributes"]["COLOR_0"])[:, :3] / 65535
+    np.testing.assert_allclose(stored, linear_from_srgb(colors), atol=1e-5)
 
 
 def test_a_mesh_for_display_keeps_place_and_colour_with_fewer_faces():

@@ -5,7 +5,7 @@ import pytest
 from gazeloc_app.routes import Routes
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import FrameInSceneLayer, SelectedFrameLayer, look_through, picture_plane
-from gazeloc_app.scene.frusta import LINES_PER_FRUSTUM, FrustaLayer, frustum_segments
+from gazeloc_app.scene.frusta import EDGES, CameraSet, FrustaLayer, frustum_points
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.keypoints import SELECTED, KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
@@ -130,26 +130,28 @@ def test_a_frustums_lines_end_where_the_camera_sees_its_pictures_corners():
     pose = RigidTransform.from_components(
         [[1.0, 2, 3], [0, 0, 0]], Rotation.from_euler("xyz", [[30, 40, 50], [0, 0, 0]], degrees=True)
     )
-    segments = frustum_segments(pose, CAMERA, 0.4)
-    assert segments.shape == (2, LINES_PER_FRUSTUM, 2, 3)
-    np.testing.assert_allclose(segments[0, :4, 0], np.tile([1.0, 2, 3], (4, 1)))
-    in_camera = pose[0].inv().apply(segments[0, :4, 1])
+    points = frustum_points(pose, CAMERA, 0.4)
+    assert points.shape == (2, 6, 3)
+    np.testing.assert_allclose(points[0, 0], [1.0, 2, 3])
+    in_camera = pose[0].inv().apply(points[0, 1:5])
     np.testing.assert_allclose(in_camera[:, 2], 0.4)
     np.testing.assert_allclose(CAMERA.project(in_camera), [[0, 0], [320, 0], [320, 240], [0, 240]], atol=1e-9)
-    roof = segments[1, 8, 1]
-    assert roof[1] < segments[1, :4, 1, 1].min()  # y points down, so the roof marks the top
+    assert {tuple(edge) for edge in EDGES[:4].tolist()} == {(0, 1), (0, 2), (0, 3), (0, 4)}
+    assert points[1, 5, 1] < points[1, 1:5, 1].min()  # y points down, so the roof marks the top
 
 
 def test_any_number_of_cameras_is_one_node(server, sent):
-    layer = FrustaLayer(server.scene, "estimate", (255, 0, 0))
+    layer = FrustaLayer(server.scene, "estimate")
     poses = RigidTransform.from_components(np.random.default_rng(0).random((300, 3)), Rotation.identity())
     path = np.array(poses.translation)
-    layer.show(poses, CAMERA, stride=3, path=path)
+    path[7] = np.nan
+    cameras = CameraSet(poses[::3], CAMERA, (255, 0, 0), path)
+    layer.show(cameras)
     assert [message for message in sent if message[0] == "GlbMessage"] == [("GlbMessage", "/frusta/estimate")]
     sent.clear()
-    layer.show(poses, CAMERA, stride=3, path=path)
+    layer.show(cameras)
     assert sent == []
-    layer.show(None, None)
+    layer.show(None)
     assert "/frusta/estimate" not in names(server)
 
 

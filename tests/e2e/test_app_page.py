@@ -9,7 +9,7 @@ import pytest
 from app_project import BOXES, SFM_FROM_SCAN, WALLS, make_app_project, true_poses
 from e2e.app_page import AppPage
 from gazeloc_app.app import App
-from gazeloc_app.scene_view import RED
+from gazeloc_app.scene_cameras import RED
 from gazeloc_app.state import Layer
 from gazeloc_app.tools.camera import CameraTool
 from gazeloc_app.tools.cloud_point import CloudPointTool

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gazeloc_app.state import AppState, Layer, Level
+from gazeloc_app.state import AppState, Coloring, Layer, Level
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,32 @@ class TintLayer:
     def apply(self, state: AppState) -> AppState:
         """The state with the tint."""
         return replace(state, layers=state.layers.with_tint(self.layer, self.tint))
+
+
+MAX_THINNING = 100
+
+
+@dataclass(frozen=True)
+class ThinCameras:
+    """Every `step`-th camera of the recording shall be drawn; None: as many as leave the room to be seen."""
+
+    step: int | None
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        step = None if self.step is None else min(max(self.step, 1), MAX_THINNING)
+        return replace(state, layers=replace(state.layers, thinning=step))
+
+
+@dataclass(frozen=True)
+class ColorCameras:
+    """The colours of the recording's cameras shall stand for something else."""
+
+    coloring: Coloring
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return replace(state, layers=replace(state.layers, coloring=self.coloring))
 
 
 @dataclass(frozen=True)

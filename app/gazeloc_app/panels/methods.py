@@ -15,7 +15,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
-from gazeloc_app.scene_view import METHOD_COLORS, RED
+from gazeloc_app.scene_cameras import METHOD_COLORS, RED
 from gazeloc_app.state import AppState
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import Trajectory

@@ -27,6 +27,11 @@ class RoomLayer:
             self._glb = glb
             self._draw()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is drawn yet."""
+        return self._glb is None
+
     def set_look(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> None:
         """Tint all colours, let the room be seen through, or hide faces from behind (`two_sided` False)."""
         look = (tint, min(max(opacity, 0.0), 1.0), two_sided)
