@@ -11,13 +11,14 @@ from gazeloc_core.errors import Cancelled, GazelocError, InputError
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
-from gazeloc_core.stage_list import STAGES, Stage, stage_named
+from gazeloc_core.stage_list import SCORES, STAGES, Stage, stage_named
 from gazeloc_core.stages.evaluation import evaluate_project, evaluate_recording, verdicts
 from gazeloc_core.stages.exports import FORMATS, export
 from gazeloc_core.stages.poses import methods_with_poses
 
 __all__ = [
     "FORMATS",
+    "SCORES",
     "STAGES",
     "evaluate_project",
     "evaluate_recording",

@@ -4,6 +4,7 @@
       project.json                     what belongs to the project (paths, tags), the alignment and method chosen
       annotations/<recording>.json     clicked keypoints
       annotations/<recording>.history.jsonl   every step that people took in the app, for undo (app: saving.py)
+      annotations/marks/<recording>.json  what people think of frames' poses
       scan/<stage>/                    artifacts of the scan
       recordings/<recording>/<stage>/  artifacts of a recording
       recordings/<recording>/<method>/<stage>/  what one method made of it: poses, gaze
@@ -27,6 +28,7 @@ from gazeloc_core.files import read_json, settle_folders, write_json_atomically
 from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.lock import WriteLock
+from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
 
 FORMAT = "gazeloc-project"
@@ -224,6 +226,16 @@ class Project:
         """The file of the steps that people took in the app."""
         return self.folder / "annotations" / f"{recording}.history.jsonl"
 
+    def marks(self, recording: str) -> FrameMarks:
+        """What people think of the frames of a recording, empty where nobody marked any."""
+        path = self._marks_path(recording)
+        return FrameMarks.from_json(read_json(path, "marks of frames")) if path.exists() else FrameMarks()
+
+    def save_marks(self, recording: str, marks: FrameMarks) -> None:
+        """Write what people think of the frames of a recording."""
+        if len(marks) or self._marks_path(recording).exists():
+            write_json_atomically(self._marks_path(recording), marks.to_json())
+
     def hash_of_file(self, path: Path) -> str:
         """The content hash of a file or folder outside the project, remembered between runs."""
         hasher = FileHasher(self.folder / ".hashes.json")
@@ -238,6 +250,9 @@ class Project:
 
     def _keypoints_path(self, recording: str) -> Path:
         return self.folder / "annotations" / f"{recording}.json"
+
+    def _marks_path(self, recording: str) -> Path:
+        return self.folder / "annotations" / "marks" / f"{recording}.json"
 
     def _stored(self, path: Path | None) -> str | None:
         """Relative to the project where that stays below a common parent, so that both can be moved together."""

@@ -15,7 +15,7 @@ from gazeloc_core.artifacts import Artifact
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report
 from gazeloc_core.project import Project
-from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan, tags
+from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan, scores, tags
 
 Run = Callable[[Project, str, Report], object]
 Inputs = Callable[[Project, str], Mapping[str, str]]
@@ -193,6 +193,10 @@ def _poses_by_alignment(method: Method) -> tuple[Stage, ...]:
     )
 
 
+def _score(project: Project, name: str, report: Report, *, method: Method) -> object:
+    return scores.score_frames(project, name, method, report=report)
+
+
 STAGES: tuple[Stage, ...] = (
     *_SHARED,
     *_poses_and_gaze(
@@ -225,6 +229,19 @@ STAGES: tuple[Stage, ...] = (
     *_poses_by_alignment(Method.SFM_PAPER),
     *_poses_by_alignment(Method.GLOBAL),
 )
+
+SCORES: dict[Method, Stage] = {
+    method: Stage(
+        name="scores",
+        title="Score the frames",
+        methods=frozenset({method}),
+        of_method=method,
+        run=partial(_score, method=method),
+        inputs=partial(scores.score_inputs, method=method),
+    )
+    for method in Method
+}
+"""Beside the method's stages: nothing depends on them, and they take as long as the recording is."""
 
 
 def stage_named(name: str, *, of_scan: bool = False, method: Method = Method.SFM) -> Stage:

@@ -9,11 +9,13 @@ from typing import Any
 from gazeloc_app.state import Annotation
 from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import KeypointSet
+from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
 
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 CODECS: dict[str, Codec] = {
     "keypoints": (KeypointSet.to_json, KeypointSet.from_json),
+    "marks": (FrameMarks.to_json, FrameMarks.from_json),
     "method": (lambda method: method.value, Method),
 }
 """To JSON and back, for fields that are not JSON themselves."""

@@ -32,6 +32,7 @@ from gazeloc_core.sfm_model import PlacedModel, SfmModel
 from gazeloc_core.stages import inputs, registration
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
+from gazeloc_core.stages.scores import FrameScores, load_scores
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
@@ -209,6 +210,29 @@ class ProjectData:
         return self._remember_or_say(
             f"{recording} errors {method_of(key)}", trajectory, lambda: _frame_errors(trajectory, truth)
         )
+
+    def frame_scores(self, recording: str, key: str | None) -> FrameScores | None:
+        """How well the frames agree with the scan by the poses of a key; None where these were not scored."""
+        if key is None:
+            return None
+        method = method_of(key)
+        poses, artifact = (self.project.result(recording, method, stage) for stage in ("trajectory", "scores"))
+        stamp, count = _stamp(artifact), len(self.recording(recording))
+        if stamp is None:
+            return None
+
+        def load() -> FrameScores | None:
+            trajectory = poses.header()
+            of_these = method is not Method.SFM or trajectory.inputs.get("alignment") == key
+            is_current = artifact.header().inputs.get("trajectory") == trajectory.content
+            return load_scores(artifact, count) if of_these and is_current else None
+
+        return self._remember_or_say(f"{recording} {method} scores", (stamp, _stamp(poses), key), load)
+
+    def scores(self, recording: str, key: str | None) -> Floats:
+        """The agreement (N,) of all frames by the poses of a key, 0 to 1, NaN where there is none."""
+        found = self.frame_scores(recording, key)
+        return np.full(len(self.recording(recording)), np.nan) if found is None else found.score
 
     def figures(self, recording: str) -> tuple[dict[str, Drawing], tuple[str, ...]] | None:
         """The charts that were drawn for a recording, and why others are missing; None before any were drawn."""

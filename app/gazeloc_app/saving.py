@@ -132,12 +132,15 @@ def annotation_in_files(project: Project, recording: str) -> Annotation:
         alignment=chosen.alignment if chosen else None,
         alignment_by_person=bool(chosen and chosen.by_person),
         method=project.method(recording),
+        marks=project.marks(recording),
     )
 
 
 def _write_files(project: Project, recording: str, annotation: Annotation) -> None:
     if project.keypoints(recording) != annotation.keypoints:
         project.save_keypoints(recording, annotation.keypoints)
+    if project.marks(recording) != annotation.marks:
+        project.save_marks(recording, annotation.marks)
     chosen = None
     if annotation.alignment is not None:
         chosen = Chosen(alignment=annotation.alignment, by_person=annotation.alignment_by_person)

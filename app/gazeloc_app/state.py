@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from gazeloc_core.keypoints import KeypointSet
+from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
 
 
@@ -79,6 +80,8 @@ class Annotation:
     alignment_by_person: bool = False
     method: Method = Method.SFM
     """Whose poses are shown and exported."""
+    marks: FrameMarks = field(default_factory=FrameMarks)
+    """What people think of frames' poses."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import fields
 
 from gazeloc_app.state import Annotation
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
+from gazeloc_core.marks import FrameMarks
 
 
 def describe(before: Annotation, after: Annotation) -> str:
@@ -19,7 +20,9 @@ def describe(before: Annotation, after: Annotation) -> str:
         found.append("Alignment chosen by a person" if after.alignment_by_person else "Alignment left to the run")
     if before.method is not after.method:
         found.append(f"Method {after.method} chosen")
-    told = {"keypoints", "alignment", "alignment_by_person", "method"}
+    if before.marks != after.marks:
+        found.append(_marks(before.marks, after.marks))
+    told = {"keypoints", "marks", "alignment", "alignment_by_person", "method"}
     others = (field.name for field in fields(Annotation) if field.name not in told)
     found += [
         f"{name.replace('_', ' ').capitalize()} changed"
@@ -41,6 +44,19 @@ def _keypoints(before: KeypointSet, after: KeypointSet) -> str:
     if new:
         return _change(KeypointPair(new[0].key, new[0].name), new[0])
     return _change(was[changed[0]], now[changed[0]]) if changed else "Keypoints put in another order"
+
+
+def _marks(before: FrameMarks, after: FrameMarks) -> str:
+    was, now = ({one.frame_index: one for one in marks.marks} for marks in (before, after))
+    frames = sorted(index for index in was.keys() | now.keys() if was.get(index) != now.get(index))
+    if len(frames) > 1:
+        return f"{len(frames)} frames marked"
+    one, earlier = now.get(frames[0]), was.get(frames[0])
+    if one is None:
+        return f"Frame {frames[0]} no longer marked"
+    if earlier is not None and earlier.mark is one.mark:
+        return f"Note of frame {frames[0]} changed"
+    return f"Frame {frames[0]} marked {one.mark}"
 
 
 def _change(was: KeypointPair, now: KeypointPair) -> str:

@@ -77,6 +77,18 @@ def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, 
     return Outcome(f"{files} files were written to {output}. Exported frames show people: treat them with care.")
 
 
+def score_frames(folder: Path, report: Report, *, recording: str, method: Method = Method.SFM) -> Outcome:
+    """How well each frame agrees with the render of the scan from its pose, after the poses of what is chosen."""
+    project = Project.open(folder)
+    pipeline.run_after_choice(project, recording, method, part(report, 0, 0.05))
+    stage = pipeline.SCORES[method]
+    pipeline.run_stage(project, stage, recording, part(report, 0.05, 1))
+    stats = stage.artifact(project, recording).header().stats
+    if not stats["scored"]:
+        return Outcome("No frame could be scored: none has a pose and enough of the scan in view.", Level.WARNING)
+    return Outcome(f"{stats['scored']} frames were scored; the median agreement is {stats['median']:.2f}.")
+
+
 def draw_figures(folder: Path, report: Report, *, recording: str) -> Outcome:
     """The paper's figures for this recording."""
     project = Project.open(folder)

@@ -20,6 +20,7 @@ from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GeometryError, InputError
 from gazeloc_core.export.files import move_all, refuse_foreign, staging_folder
+from gazeloc_core.marks import FrameMarks
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
@@ -42,13 +43,15 @@ def write_nerfstudio(
     *,
     undistorted: Iterable[tuple[int, Bytes]] | None = None,
     file_paths: Mapping[int, str] | None = None,
+    marks: FrameMarks | None = None,
     overwrite: bool = False,
     report: Report = silent,
 ) -> list[Path]:
     """Write `folder`/transforms.json for `registered_frames`; the list of files written.
 
     `undistorted` gives their pictures (index, (H, W, 3) RGB of the camera `pinhole`), which are written to
-    `folder`/images. Without it, `file_paths` names pictures that are there already, by frame index.
+    `folder`/images. Without it, `file_paths` names pictures that are there already, by frame index. `marks` go beside
+    their frames, where other programs read over them.
 
     Raises:
         GeometryError: if no frame was registered, or `pinhole` has distortion.
@@ -67,7 +70,9 @@ def write_nerfstudio(
             paths = _write_images(undistorted, frames, pinhole, staging, report)
         if missing := [index for index in frames if index not in paths]:
             raise InputError(f"Frame {missing[0]} is registered but has no undistorted picture; undistort it first.")
-        content = json.dumps(_content(trajectory, frames, paths, pinhole), indent=1, allow_nan=False)
+        content = json.dumps(
+            _content(trajectory, frames, paths, pinhole, marks or FrameMarks()), indent=1, allow_nan=False
+        )
         (staging / FILE_NAME).write_text(content + "\n", encoding="utf-8")
         return move_all(staging, folder)
 
@@ -78,7 +83,10 @@ def gl_pose(trajectory: Trajectory, index: int) -> Floats:
     return np.asarray(pose.as_matrix()[0] @ CAMERA_FROM_GL, dtype=np.float64)
 
 
-def _content(trajectory: Trajectory, frames: list[int], paths: Mapping[int, str], pinhole: Camera) -> dict[str, Any]:
+def _content(
+    trajectory: Trajectory, frames: list[int], paths: Mapping[int, str], pinhole: Camera, marks: FrameMarks
+) -> dict[str, Any]:
+    marked = {one.frame_index: {"mark": one.mark.value, "note": one.note} for one in marks.marks}
     (fx, fy), (cx, cy) = (values.tolist() for values in (pinhole.focal_px, pinhole.principal_point_px))
     return {
         "generator": GENERATOR,
@@ -99,6 +107,7 @@ def _content(trajectory: Trajectory, frames: list[int], paths: Mapping[int, str]
                 "transform_matrix": gl_pose(trajectory, index).tolist(),
                 "frame_index": index,
                 "timestamp_ns": int(trajectory.timestamp_ns[index]),
+                **marked.get(index, {}),
             }
             for index in frames
         ],

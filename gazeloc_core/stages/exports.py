@@ -63,7 +63,7 @@ def _csv(project: Project, recording: str, method: Method, folder: Path, report:
     state, reason = gaze.state(gaze_inputs(project, recording, method))
     if state is not State.FRESH:
         raise ProjectError(f"{recording}: the gaze is {state.value} ({reason}); run `gazeloc run` first.")
-    files = write_poses_csv(trajectory, folder / "poses.csv")
+    files = write_poses_csv(trajectory, folder / "poses.csv", marks=project.marks(recording))
     if gaze.header().stats["samples"]:
         report(0.5, "writing gaze3d.csv")
         files += write_gaze3d_csv(inputs.load_gaze(gaze.read_arrays()), folder / "gaze3d.csv")
@@ -96,7 +96,8 @@ def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, 
         for index, rgb in opened.frames.iterate(np.array(wanted, dtype=np.int64).tolist()):
             yield index, undistorter.image(rgb)
 
-    return write_nerfstudio(trajectory, undistorter.target, folder, undistorted=pictures(), report=report)
+    marks = project.marks(recording)
+    return write_nerfstudio(trajectory, undistorter.target, folder, undistorted=pictures(), marks=marks, report=report)
 
 
 FORMATS: dict[str, Callable[[Project, str, Method, Path, Report], list[Path]]] = {

@@ -7,6 +7,7 @@ from gazeloc_app import history as history_module
 from gazeloc_app import state as state_module
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.history import Redo, Undo
+from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.annotation_json import changed_from_json, changes_to_json
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
+from gazeloc_core.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.methods import Method
 
 PAIR = KeypointPair(
@@ -28,6 +30,7 @@ OTHER_VALUES = {  # of every field of Annotation; a new field needs one, and per
     "alignment": "abc",
     "alignment_by_person": True,
     "method": Method.TAGS,
+    "marks": FrameMarks((FrameMark(3, Mark.BAD, "too far left"),)),
 }
 actions = st.one_of(
     st.builds(PickPoint, st.sampled_from(Side), st.tuples(*[st.floats(-5, 5)] * 3), st.booleans()),
@@ -35,6 +38,8 @@ actions = st.one_of(
     st.builds(DeletePair, st.sampled_from(["k1", "k2"])),
     st.builds(ChooseAlignment, st.none() | st.sampled_from(["a", "b"])),
     st.builds(ChooseMethod, st.sampled_from(Method)),
+    st.builds(MarkFrame, st.sampled_from(Mark)),
+    st.builds(NoteFrame, st.integers(0, 3), st.text(max_size=5)),
     st.builds(Undo),
     st.builds(Undo),
     st.builds(Redo),

@@ -1,6 +1,6 @@
 """`make bench`: every number that the issue of this product and its README name, measured now, with its target.
 
-    python tests/benchmarks [alignment | scene | chair | bedroom | app] ...
+    python tests/benchmarks [alignment | scene | chair | bedroom | app | agreement] ...
 
 Exit code 1 where a target is missed. Times are of this machine at this moment; ratios hold on noisy ones.
 """
@@ -64,12 +64,20 @@ def browser_app(work: Path) -> list[Row]:
     return bench_app(work)
 
 
+def agreement(work: Path) -> list[Row]:
+    """Whether the agreement score ranks wrong poses below true ones."""
+    from bench_agreement import bench_agreement
+
+    return bench_agreement(STUDIO)
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
     "scene": whole_scene,
     "chair": real_chair,
     "bedroom": real_bedroom,
     "app": browser_app,
+    "agreement": agreement,
 }
 
 
