@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import signal
 import threading
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,8 @@ from gazeloc_app.actions.jobs import JobEnded, StartJob
 from gazeloc_app.actions.views import NameRenderer, ShowFrame
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
+from gazeloc_app.door.address import link_host
+from gazeloc_app.door.login import needs_token, new_token
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
 from gazeloc_app.panels.alignment import AlignmentPanel
@@ -56,14 +59,25 @@ log = logging.getLogger(__name__)
 class App:
     """One project in the browser, until `stop()`. Holds the project's write lock."""
 
-    def __init__(self, project: Project, *, host: str = "127.0.0.1", port: int = 8080):
-        """Open the project.
+    def __init__(
+        self,
+        project: Project,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        allow_hosts: Sequence[str] = (),
+        export_folder: Path | None = None,
+    ):
+        """Open the project; who comes from elsewhere than this machine needs the token that `address` carries.
 
         Raises:
             GazelocError: if the address is refused, the port is taken, another process writes to the project, or the
                 scan or the first recording cannot be opened.
         """
         self.project = project
+        self.export_folder = export_folder or project.folder / "export"
+        self._link_host = link_host(host)
+        self._token = new_token() if needs_token(host, allow_hosts) else None
         with ExitStack() as undo:  # what was begun is ended again where a later step is refused
             self._lock = undo.enter_context(project.lock())
             project.settle()
@@ -76,7 +90,14 @@ class App:
             self.jobs = JobRunner(project.folder, self.store.dispatch)
             self._render = RenderProcess(_sources(project), self._say_trouble)
             undo.callback(self._render.close)
-            self.server = make_server(port, self._routes(), host=host, title=f"GazeLoc · {project.folder.name}")
+            self.server = make_server(
+                port,
+                self._routes(),
+                host=host,
+                title=f"GazeLoc · {project.folder.name}",
+                allow_hosts=allow_hosts,
+                token=self._token,
+            )
             undo.pop_all()
         self._browsers: dict[int, Browser] = {}
         self._last_job = 0
@@ -113,8 +134,9 @@ class App:
 
     @property
     def address(self) -> str:
-        """What to open in the browser."""
-        return f"http://localhost:{self.server.get_port()}"
+        """What to open in the browser; holds the token where one is needed."""
+        address = f"http://{self._link_host}:{self.server.get_port()}"
+        return f"{address}/?token={self._token}" if self._token else address
 
     def run_everything(self) -> None:
         """Start the stages that are missing, as the button does."""
@@ -140,7 +162,7 @@ class App:
             layer_panel = LayerPanel(gui, dispatch, self.scene.facts)
             camera_colors = CameraColors(gui, self.scene.cameras, dispatch)
         with tabs.add_tab("Export"):
-            export_panel = ExportPanel(gui, self.project.folder / "export", self.data, dispatch)
+            export_panel = ExportPanel(gui, self.export_folder, self.data, dispatch)
         side = gui.add_panel()
         with side.add_tab("Frame"):
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
@@ -221,9 +243,17 @@ class App:
             self.jobs.start(after.job.name, after.job.task, **dict(after.job.keywords))
 
 
-def serve(folder: Path, *, host: str = "127.0.0.1", port: int = 8080, run_everything: bool = False) -> None:
+def serve(
+    folder: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    allow_hosts: Sequence[str] = (),
+    export_folder: Path | None = None,
+    run_everything: bool = False,
+) -> None:
     """Open a project in the browser and print its address; returns when the process is asked to end."""
-    app = App(Project.open(folder), host=host, port=port)
+    app = App(Project.open(folder), host=host, port=port, allow_hosts=allow_hosts, export_folder=export_folder)
     app.start()
     if run_everything:
         app.run_everything()

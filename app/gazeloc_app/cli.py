@@ -22,7 +22,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from gazeloc_app.loopback import check_loopback
+from gazeloc_app.door.address import check_address
 from gazeloc_core import __version__
 from gazeloc_core.errors import Cancelled, GazelocError, InputError
 
@@ -50,6 +50,9 @@ OptionalPath = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 OptionalText = Annotated[str | None, tyro.conf.arg(metavar="TEXT")]
 OptionalName = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
 TagSize = Annotated[float | None, tyro.conf.arg(metavar="METRES", help=TAG_SIZE_HELP)]
+AllowedHosts = Annotated[
+    tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME", help_behavior_hint="")
+]
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
 
@@ -147,18 +150,29 @@ def run(project: Project, *, method: str = "sfm", recording: OptionalName = None
 
 
 @deferred
-def view(project: Project, *, port: int = 8080, host: str = "127.0.0.1") -> None:
+def view(
+    project: Project,
+    *,
+    port: int = 8080,
+    host: str = "127.0.0.1",
+    allow_host: AllowedHosts = (),
+    export_to: OptionalPath = None,
+) -> None:
     """Open the project in the browser.
+
+    On this machine nobody is asked for a token. On any other address everybody is: the link that is printed carries it.
 
     Args:
         project: The project folder.
         port: The port of the app; 0 takes a free one.
-        host: The address to listen on; only the loopback is allowed (use `ssh -L` from elsewhere).
+        host: The address to listen on: 127.0.0.1 for this machine only, 0.0.0.0 for every network that it is in.
+        allow_host: A further name of the app, that of a reverse proxy for example; may be given again.
+        export_to: The folder that the app's exports are made in, by default the project's `export`.
     """
-    check_loopback(host)
+    check_address(host)
     from gazeloc_app.app import serve
 
-    serve(project, host=host, port=port)
+    serve(project, host=host, port=port, allow_hosts=allow_host, export_folder=export_to and export_to.resolve())
 
 
 @deferred

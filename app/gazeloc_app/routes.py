@@ -31,6 +31,8 @@ class Reply:
     status: int = 200
     cache_s: int = 0
     """Seconds for which the browser may reuse it; 0 forbids."""
+    headers: Mapping[str, str] = field(default_factory=dict)
+    """Further headers."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,8 @@
-"""The door: the viewer's web server, on the loopback only, for our own page only, with our routes on the same port.
+"""The viewer's web server with the door in front of it (door/), and our routes on the same port.
 
 viser binds to all interfaces, checks neither Host nor Origin, lets a client overwrite any field of a widget and opens a
-public tunnel when asked. This module closes these, and is the only one that uses viser's private names; each has a
-test in tests/app/test_server.py that fails when another version of viser lacks it. Who may come in is a list of checks
-(`Check`), so that a login becomes one more of them.
+public tunnel when asked. This module and door/ close these, and are the only ones that use viser's private names; each
+has a test in tests/app/test_server.py that fails when another version of viser lacks it.
 """
 
 from __future__ import annotations
@@ -11,10 +10,10 @@ from __future__ import annotations
 import contextlib
 import inspect
 import io
-import re
 import socket
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
 
@@ -24,21 +23,73 @@ from viser import _gui_api, _messages
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from gazeloc_app.gui_values import is_offered
-from gazeloc_app.loopback import check_loopback
+from gazeloc_app.door.address import check_address
+from gazeloc_app.door.connection import Crowd
+from gazeloc_app.door.gui_values import is_offered, takes_files
+from gazeloc_app.door.hosts import Hosts, Refusal, is_websocket, own_hosts
+from gazeloc_app.door.limits import MAX_MESSAGE_BYTES
+from gazeloc_app.door.login import Login, needs_token
+from gazeloc_app.door.paths import is_plain
 from gazeloc_app.page import dress
 from gazeloc_app.routes import Reply, Routes
 from gazeloc_core.errors import InputError
 
-MAX_MESSAGE_BYTES = 4 * 1024 * 1024
-"""Largest message that a browser may send; the biggest honest one is a part of an upload, half a megabyte."""
 _OPEN_TIMEOUT_S = 60
 """The handshake's limit covers our routes, and the first render waits for the mesh to load."""
-_LOOPBACK_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:[0-9]{1,5})?", re.IGNORECASE)
+_PAGE_POLICY = "; ".join(
+    [
+        "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:",
+        "frame-ancestors 'self'",
+        "form-action 'self'",
+        "base-uri 'none'",
+        "object-src 'none'",
+    ]
+)
+"""The page needs nothing from elsewhere, and so cannot be made to tell anything there."""
 _constructing = threading.Lock()
 
-Check = Callable[[Request], str | None]
-"""Looks at a request before anything is answered: None lets it in, a sentence refuses it."""
+
+@dataclass(frozen=True)
+class Entrance:
+    """Who may come in and what they find there."""
+
+    hosts: Hosts
+    login: Login | None
+    routes: Routes
+    title: str
+    crowd: Crowd
+
+    async def answer(self, viser_answer: Any, connection: Any, request: Request) -> Response | None:
+        """The answer to a request, None where it becomes a page's connection."""
+        refusal = self._refusal(connection, request)
+        if refusal is not None:
+            body = refusal.sentence.encode()
+            return _response(Reply(body=body, content_type="text/plain; charset=utf-8", status=refusal.status))
+        if self.login is not None:
+            reply = await self.login.answer(request)
+            if reply is not None:
+                return _response(reply)
+        if is_websocket(request):
+            return None
+        reply = await self.routes.answer(request.path)
+        if reply is not None:
+            return _response(reply)
+        page: Response = viser_answer(connection, request)
+        dress(page, request.path, self.title)
+        page.headers["Content-Security-Policy"] = _PAGE_POLICY
+        page.headers["Referrer-Policy"] = "same-origin"
+        page.headers["X-Content-Type-Options"] = "nosniff"
+        return page
+
+    def _refusal(self, connection: Any, request: Request) -> Refusal | None:
+        if not is_plain(request.path):
+            return Refusal(status=HTTPStatus.NOT_FOUND, sentence="There is nothing under this path.")
+        local = connection.local_address
+        refusal = self.hosts.check(request, local[0] if local else None)
+        if refusal is None and is_websocket(request) and self.crowd.is_full:
+            sentence = "GazeLoc is open in too many pages at once; close one."
+            return Refusal(status=HTTPStatus.SERVICE_UNAVAILABLE, sentence=sentence)
+        return refusal
 
 
 def make_server(
@@ -48,27 +99,34 @@ def make_server(
     host: str = "127.0.0.1",
     title: str = "GazeLoc",
     dark_mode: bool = False,
-    checks: Sequence[Check] = (),
+    allow_hosts: Sequence[str] = (),
+    token: str | None = None,
 ) -> viser.ViserServer:
-    """A running server on the loopback; port 0 takes any free one (`server.get_port()`).
+    """A running server; port 0 takes any free one (`server.get_port()`).
 
-    `checks` come after the check of Host and Origin.
+    `allow_hosts` are further names that a proxy gives the app. Who does not show `token` is not let in; None, which
+    lets everybody in, is for the loopback only (`needs_token`).
 
     Raises:
-        InputError: if `host` is not the loopback, or the port is taken or not allowed.
+        InputError: if `host` is no address, one of `allow_hosts` no name, or the port is taken or not allowed.
     """
-    listener = _listen(host, port)
+    address = check_address(host)
+    hosts = own_hosts(address, allow_hosts)
+    assert token or not needs_token(host, allow_hosts), "others can reach this address, so it needs a token"
+    listener = _listen(address, port)
+    bound = listener.getsockname()[1]
+    login = Login(bound, token) if token else None
+    _guard_widgets()
     try:
         with (
-            _serving_through(listener, routes, (own_page_only, *checks), title),
+            _serving_through(listener, Entrance(hosts, login, routes, title, Crowd())),
             contextlib.redirect_stdout(io.StringIO()),
         ):
-            server = viser.ViserServer(host=host, port=listener.getsockname()[1], label=title, verbose=False)
+            server = viser.ViserServer(host=address, port=bound, label=title, verbose=False)
     except BaseException:
         listener.close()
         raise
     _forbid_sharing(server)
-    _accept_values_only()
     server.gui.configure_theme(
         dark_mode=dark_mode, show_logo=False, show_share_button=False, brand_color=(28, 110, 140)
     )
@@ -86,35 +144,8 @@ def _set_even_light(server: viser.ViserServer) -> None:
     server.scene.add_light_ambient("/light", intensity=3.0)
 
 
-def own_page_only(request: Request) -> str | None:
-    """Let in our own page in a browser on this machine: guards against other pages and against DNS rebinding.
-
-    The Host must be a loopback name (any port: `ssh -L` may change it). A websocket must come from a page of the very
-    same origin. Another site's page may link here, but may not embed our page or pictures.
-    """
-    hosts = request.headers.get_all("Host")
-    if len(hosts) != 1 or not _LOOPBACK_NAME.fullmatch(hosts[0]):
-        return "GazeLoc answers on this machine only; open it as http://localhost."
-    origins = request.headers.get_all("Origin")
-    if origins and origins != [f"http://{hosts[0]}"]:
-        return "Another page may not talk to GazeLoc."
-    if is_websocket(request):
-        return None if origins else "GazeLoc's connection is for its own page in a browser."
-    site = request.headers.get("Sec-Fetch-Site", "none")
-    is_link = request.headers.get("Sec-Fetch-Dest") == "document"
-    if site not in ("same-origin", "none") and not is_link:
-        return "Another page may not show GazeLoc's pictures."
-    return None
-
-
-def is_websocket(request: Request) -> bool:
-    """Whether the browser asks to upgrade the connection."""
-    return "websocket" in (value.lower() for value in request.headers.get_all("Upgrade"))
-
-
-def _listen(host: str, port: int) -> socket.socket:
+def _listen(address: str, port: int) -> socket.socket:
     """A bound socket: viser itself would move on in silence to the next free port."""
-    address = check_loopback(host)
     listener = socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -130,14 +161,20 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 @contextlib.contextmanager
-def _serving_through(listener: socket.socket, routes: Routes, checks: Sequence[Check], title: str) -> Iterator[None]:
-    """While this is open, the server that viser starts listens on `listener` and asks `checks` and `routes` first."""
+def _serving_through(listener: socket.socket, entrance: Entrance) -> Iterator[None]:
+    """While this is open, the server that viser starts listens on `listener` and has `entrance` in front of it."""
     plain_serve = websockets.asyncio.server.serve
 
     def serve(handler: Any, _host: Any, _port: Any, *, process_request: Any, **options: Any) -> Any:
-        options |= {"max_size": MAX_MESSAGE_BYTES, "open_timeout": _OPEN_TIMEOUT_S}
-        answer = _request_handler(process_request, routes, checks, title)
-        return plain_serve(handler, sock=listener, process_request=answer, **options)
+        async def answer(connection: Any, request: Request) -> Response | None:
+            return await entrance.answer(process_request, connection, request)
+
+        options |= {
+            "max_size": MAX_MESSAGE_BYTES,
+            "open_timeout": _OPEN_TIMEOUT_S,
+            "create_connection": entrance.crowd.connect,
+        }
+        return plain_serve(entrance.crowd.limited(handler), sock=listener, process_request=answer, **options)
 
     with _constructing:
         websockets.asyncio.server.serve = serve  # type: ignore[assignment,misc]
@@ -145,25 +182,6 @@ def _serving_through(listener: socket.socket, routes: Routes, checks: Sequence[C
             yield
         finally:
             websockets.asyncio.server.serve = plain_serve  # type: ignore[misc]
-
-
-def _request_handler(viser_answer: Any, routes: Routes, checks: Sequence[Check], title: str) -> Any:
-    async def answer(connection: Any, request: Request) -> Response | None:
-        refusal = next((sentence for check in checks if (sentence := check(request))), None)
-        if refusal is not None:
-            body = refusal.encode()
-            return _response(Reply(body=body, content_type="text/plain; charset=utf-8", status=403))
-        if is_websocket(request):
-            return None
-        reply = await routes.answer(request.path)
-        if reply is not None:
-            return _response(reply)
-        page: Response = viser_answer(connection, request)
-        dress(page, request.path, title)
-        page.headers["Content-Security-Policy"] = "frame-ancestors 'self'"
-        return page
-
-    return answer
 
 
 def _response(reply: Reply) -> Response:
@@ -175,6 +193,7 @@ def _response(reply: Reply) -> Response:
             "Cross-Origin-Resource-Policy": "same-origin",
             "X-Content-Type-Options": "nosniff",
         }
+        | dict(reply.headers)
     )
     return Response(reply.status, HTTPStatus(reply.status).phrase, headers, reply.body)
 
@@ -185,17 +204,25 @@ def _forbid_sharing(server: viser.ViserServer) -> None:
     server._websock_server.unregister_handler(_messages.ShareUrlDisconnect)
 
 
-def _accept_values_only() -> None:
-    """Drop a browser's changes to a widget but for values that it offers; viser would set even its callbacks."""
-    plain = _gui_api.GuiApi._handle_gui_updates
+def _guard_widgets() -> None:
+    """Drop what a browser sends to a widget but for values and files that it takes; viser would set any field of it.
+
+    Must come before a server is made: its handlers are bound as it is.
+    """
+    plain, plain_start = _gui_api.GuiApi._handle_gui_updates, _gui_api.GuiApi._handle_file_transfer_start
     if getattr(plain, "is_guarded", False):
         return
     assert inspect.iscoroutinefunction(plain)
 
-    async def guarded(self: Any, client_id: Any, message: Any) -> None:
+    async def values_only(self: Any, client_id: Any, message: Any) -> None:
         handle = self._gui_input_handle_from_uuid.get(message.uuid)
         if handle is not None and set(message.updates) == {"value"} and is_offered(handle, message.updates["value"]):
             await plain(self, client_id, message)
 
-    guarded.is_guarded = True  # type: ignore[attr-defined]
-    _gui_api.GuiApi._handle_gui_updates = guarded  # type: ignore[method-assign]
+    def to_upload_buttons_only(self: Any, client_id: Any, message: Any) -> None:
+        if takes_files(self._gui_input_handle_from_uuid.get(message.source_component_uuid)):
+            plain_start(self, client_id, message)
+
+    values_only.is_guarded = True  # type: ignore[attr-defined]
+    _gui_api.GuiApi._handle_gui_updates = values_only  # type: ignore[method-assign]
+    _gui_api.GuiApi._handle_file_transfer_start = to_upload_buttons_only  # type: ignore[method-assign]

@@ -117,8 +117,13 @@ add("unknown unit", r"unit 'furlong' is unknown; use one of m, cm", "@new --unit
 add("unknown up axis", r"up axis 'w' is unknown; use one of x, y", "@new --up w")
 add("name that leads elsewhere", r"'\.\./up' cannot be used .*; use letters", "@new --name ../up")
 add("COLMAP times without a model", r"truth\.tum: --colmap-times needs --colmap", "@new --colmap-times @truth.tum")
-add("any address", r"--host 0\.0\.0\.0: .* this machine only.*; use 127\.0\.0\.1", "view @project --host 0.0.0.0")
-add("empty address", r"--host : .*this machine only", "view @project --host=")
+add(
+    "name for an address",
+    r"--host example\.org: .*not an address; give 127\.0\.0\.1",
+    "view @project --host example.org",
+)
+add("empty address", r"--host : .*not an address", "view @project --host=")
+add("URL for a host", r"--allow-host http://lab: give the bare name", "view @project --allow-host http://lab")
 add("port out of range", r"Port 70000 .*0 to 65535.* choose another", "view @project --port 70000")
 
 # The scan.

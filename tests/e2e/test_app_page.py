@@ -280,17 +280,18 @@ def test_layers_are_hidden_and_shown(open_app):
         page.until(lambda shown=shown: (page.viewer.color_at(spot).tolist() == list(WALLS["floor"])) == shown)
 
 
-def test_exporting_writes_files(open_app, tmp_path):
+def test_exporting_writes_files(open_app, project):
     page = open_app()
     align(page)
     page.tab("Export")
     page.field("TUM").click()
     page.field("nerfstudio").click()
-    page.field("Folder").fill(str(tmp_path / "out"))
+    page.field("Folder").fill("first try")
     page.page.wait_for_timeout(500)
     page.press("Export").until(lambda: page.state.job is None and "files were written" in page.state.notice.text, 120)
-    assert len((tmp_path / "out" / "tum" / "poses.tum").read_text().splitlines()) >= 8
-    transforms = json.loads((tmp_path / "out" / "nerfstudio" / "transforms.json").read_text())
+    folder = project.folder / "export" / "first try"
+    assert len((folder / "tum" / "poses.tum").read_text().splitlines()) >= 8
+    transforms = json.loads((folder / "nerfstudio" / "transforms.json").read_text())
     assert len(transforms["frames"]) == 8
     page.viewer.save("app-exported")
 

@@ -11,7 +11,9 @@ from gazeloc_app import tasks, widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
+from gazeloc_app.door.paths import folder_inside
 from gazeloc_app.state import AppState, Level
+from gazeloc_core.errors import InputError
 
 FORMATS = {
     "csv": ("CSV", "poses.csv with a row per frame, gaze3d.csv with a row per gaze sample"),
@@ -22,9 +24,9 @@ FORMATS = {
 
 
 class ExportPanel:
-    """Formats, a folder on the computer that runs GazeLoc, and the button."""
+    """Formats, a folder, and the button. What a browser names is a folder inside of `root` and nowhere else."""
 
-    def __init__(self, gui: GuiApi, folder: Path, data: ProjectData, dispatch: Callable[[Action], None]):
+    def __init__(self, gui: GuiApi, root: Path, data: ProjectData, dispatch: Callable[[Action], None]):
         self._recording = ""
         self._has_poses = False
         self._data = data
@@ -32,8 +34,10 @@ class ExportPanel:
         self._boxes = {
             name: gui.add_checkbox(label, name == "csv", hint=hint) for name, (label, hint) in FORMATS.items()
         }
-        self._folder = gui.add_text("Folder", str(folder), hint="On the computer that runs GazeLoc.")
-        self._button = gui.add_button("Export", icon=None)
+        self._root = root
+        self._folder = gui.add_text("Folder", "", hint="A name, of a folder that is made in the one below.")
+        self._button = gui.add_button("Export", hint="Writes on the computer that runs GazeLoc.")
+        gui.add_html(widgets.box(f"Into {widgets.text(root)}."))
         gui.add_html(widgets.box("Exported frames show people. Treat them like the recordings themselves."))
         widgets.on_user(self._button, lambda _: self._export(), event="on_click")
 
@@ -45,11 +49,19 @@ class ExportPanel:
 
     def _export(self) -> None:
         formats = tuple(name for name, box in self._boxes.items() if box.value)
-        output = str(self._folder.value).strip()
+        name = str(self._folder.value)
         if not self._has_poses:
             self._dispatch(Notify(Level.WARNING, "There are no poses to export yet; align, or run the method first."))
-        elif not formats or not output:
-            self._dispatch(Notify(Level.WARNING, "Choose at least one format, and a folder."))
+        elif not formats:
+            self._dispatch(Notify(Level.WARNING, "Choose at least one format."))
         else:
-            keywords = (("recording", self._recording), ("formats", formats), ("output", output))
-            self._dispatch(StartJob("Export", tasks.export, keywords))
+            self._start(formats, name)
+
+    def _start(self, formats: tuple[str, ...], name: str) -> None:
+        try:
+            output = str(folder_inside(self._root, name))
+        except InputError as error:
+            self._dispatch(Notify(Level.WARNING, str(error)))
+            return
+        keywords = (("recording", self._recording), ("formats", formats), ("output", output))
+        self._dispatch(StartJob("Export", tasks.export, keywords))
