@@ -20,12 +20,13 @@ import viser
 from gazeloc_app import tasks
 from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
-from gazeloc_app.actions.jobs import JobEnded, StartJob
+from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
 from gazeloc_app.actions.views import NameRenderer, ShowFrame
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
+from gazeloc_app.job_list import JobList
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
 from gazeloc_app.panels.alignment import AlignmentPanel
@@ -33,10 +34,11 @@ from gazeloc_app.panels.camera_colors import CameraColors
 from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.frames import FramePanel
+from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.methods import MethodPanel
-from gazeloc_app.panels.project import JobBar, ProjectPanel
+from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Describe, SeenTags, Sources
@@ -81,12 +83,15 @@ class App:
         with ExitStack() as undo:  # what was begun is ended again where a later step is refused
             self._lock = undo.enter_context(project.lock())
             project.settle()
+            self.store = Store(_empty_state(project), batch=lambda: self.server.atomic())
             self.data = ProjectData(project, self._say_damage)
             self.data.scan()
             self._saver = Saver(project, self._say_damage)
-            self.store = Store(_first_state(project, self._saver), batch=lambda: self.server.atomic())
+            self._job_list = JobList(project, self._say_damage)
+            self.store.begin(self._saver.open(self.store.state.recording).put_into(self.store.state))
             self.data.recording(self.store.state.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)
+            self.store.dispatch(OfferJobs(self._job_list.read()))
             self.jobs = JobRunner(project.folder, self.store.dispatch)
             self._render = RenderProcess(_sources(project), self._say_trouble)
             undo.callback(self._render.close)
@@ -106,9 +111,11 @@ class App:
         self._build_panels()
         self.store.add_view(self._render_browsers)
         self.store.add_saver(self._saver.commit)
+        self.store.add_saver(self._job_list.save)
         self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
         self.store.add_effect(self.live.follow)
+        self.store.add_effect(self._cancel_job)
         self.store.add_effect(self._show_first_pose)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
@@ -146,10 +153,11 @@ class App:
         gui, dispatch, state = self.server.gui, self.store.dispatch, self.store.state
         gui.main_panel.dock_right()
         gui.main_panel.set_width(400)
-        job_bar = JobBar(gui, self.jobs.cancel)
+        job_bar = JobBar(gui, dispatch)
         tabs = gui.add_tab_group(order=1000)
         with tabs.add_tab("Project"):
             project_panel = ProjectPanel(gui, self.project, state, dispatch, self._open_recording)
+            job_logs = JobLogs(gui, str(self.project.folder / "logs"))
         with tabs.add_tab("Keypoints"):
             keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
         with tabs.add_tab("Align"):
@@ -170,7 +178,7 @@ class App:
         side.set_width(430)
         work = (project_panel, keypoint_panel, alignment_panel)
         looks = (method_panel, figure_panel, layer_panel, camera_colors, export_panel, frame_panel)
-        for panel in (job_bar, *work, *looks):
+        for panel in (job_bar, job_logs, *work, *looks):
             self.store.add_view(panel.render)
 
     def _routes(self) -> Routes:
@@ -242,6 +250,11 @@ class App:
         else:
             self.jobs.start(after.job.name, after.job.task, **dict(after.job.keywords))
 
+    def _cancel_job(self, before: AppState, after: AppState) -> None:
+        del before
+        if after.job is not None and after.job.is_cancelling and after.job.number == self._last_job:
+            self.jobs.cancel()
+
 
 def serve(
     folder: Path,
@@ -265,11 +278,11 @@ def serve(
     app.stop()
 
 
-def _first_state(project: Project, saver: Saver) -> AppState:
+def _empty_state(project: Project) -> AppState:
     names = tuple(project.settings.recordings)
     if not names:
         raise ProjectError(f"{project.folder}: the project has no recording; add one with `gazeloc add`.")
-    return saver.open(names[0]).put_into(AppState(names, names[0]))
+    return AppState(names, names[0])
 
 
 def _sources(project: Project) -> Sources:

@@ -1,4 +1,4 @@
-"""Long work in a process of its own, one piece at a time, with progress and cancel.
+"""Long work in a process of its own, one piece at a time, with progress, a log and cancel.
 
 Open3D and pycolmap hold Python's GIL for seconds, and a crash of theirs takes the process along; in here neither can
 freeze or end the app. The worker starts once (its imports take seconds) and again after it died. Cancel asks first
@@ -22,7 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from gazeloc_app.actions.action import Action
-from gazeloc_app.actions.jobs import JobCancelling, JobEnded, JobProgressed
+from gazeloc_app.actions.jobs import JobEnded, JobProgressed
+from gazeloc_app.job_log import JobLog
+from gazeloc_app.remaining import Remaining
 from gazeloc_app.state import Level
 from gazeloc_core.errors import Cancelled, GazelocError
 from gazeloc_core.progress import Report
@@ -73,7 +75,6 @@ class JobRunner:
         """Ask the running task to stop; it is ended if it does not answer in time."""
         if self._busy.locked():
             self._cancel.set()
-            self._dispatch(JobCancelling())
 
     def stop(self) -> None:
         """End the worker process."""
@@ -83,24 +84,30 @@ class JobRunner:
             process.join()
 
     def _watch(self, name: str, task: Task, keywords: dict[str, Any]) -> None:
+        job_log = JobLog(self._folder, name)
+        job_log.add(f"{name} begins.")
         try:
-            ended = self._run(name, task, keywords)
+            ended = self._run(name, task, keywords, job_log)
         except (OSError, EOFError):
             self.stop()
             ended = self._died(name)
         finally:
             self._busy.release()
+        job_log.add(f"{ended.level.value}: {ended.text}")
         self._dispatch(ended)
 
-    def _run(self, name: str, task: Task, keywords: dict[str, Any]) -> JobEnded:
+    def _run(self, name: str, task: Task, keywords: dict[str, Any], job_log: JobLog) -> JobEnded:
         connection = self._worker()
         connection.send((task, keywords))
+        remaining = Remaining(time.monotonic())
         asked_at: float | None = None
         while True:
             if connection.poll(0.1):
                 kind, value = connection.recv()
                 if kind == "progress":
-                    self._dispatch(JobProgressed(*value))
+                    fraction, text = value
+                    left, line = remaining.after(time.monotonic(), fraction), job_log.add(text, fraction)
+                    self._dispatch(JobProgressed(fraction, text, left, line))
                 elif kind == "done":
                     return JobEnded(value.level, value.text, value.alignment, value.by_person)
                 elif kind == "cancelled":

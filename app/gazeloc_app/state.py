@@ -58,16 +58,34 @@ class Notice:
 
 @dataclass(frozen=True)
 class Job:
-    """Long work that is under way, outside of the app's process: `task` (see tasks.py) with its keywords."""
+    """Long work outside of the app's process, under way or asked for: `task` (see tasks.py) with its keywords."""
 
     name: str
     task: Callable[..., Any]
     keywords: tuple[tuple[str, Any], ...] = ()
     fraction: float = 0.0
     text: str = ""
+    remaining: str = ""
+    """How much longer it takes, in words; "" while nobody can tell."""
+    log: tuple[str, ...] = ()
+    """The last lines of its log."""
     is_cancelling: bool = False
     number: int = 0
     """Counts the jobs of a session, so that one can be told from the next of the same name."""
+
+    def is_same_work(self, other: Job) -> bool:
+        """Whether the other does the very same."""
+        return (self.task, self.keywords) == (other.task, other.keywords)
+
+
+@dataclass(frozen=True)
+class EndedJob:
+    """What became of long work: its last sentence and the last lines of its log."""
+
+    name: str
+    notice: Notice
+    log: tuple[str, ...]
+    number: int
 
 
 @dataclass(frozen=True)
@@ -138,12 +156,27 @@ class AppState:
     draws_tags: bool = False
     """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None
+    waiting_jobs: tuple[Job, ...] = ()
+    """Asked for while `job` runs; they follow one after the other."""
+    ended_jobs: tuple[EndedJob, ...] = ()
+    """The last ones of this session, the newest first."""
+    offered_jobs: tuple[Job, ...] = ()
+    """What was under way when GazeLoc ended the last time; begun only when somebody says so."""
     jobs_started: int = 0
     notice: Notice | None = None
     data_revision: int = 0
     """Counts up whenever a stage finished, so that views read its artifacts anew."""
     renderer_note: str = ""
     """What to say about the renderer of pictures where it stands in for the usual one."""
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """What runs, then what waits."""
+        return (() if self.job is None else (self.job,)) + self.waiting_jobs
+
+    def has_job(self, name: str) -> bool:
+        """Whether long work of this name runs or waits."""
+        return any(job.name == name for job in self.jobs)
 
     def annotate(self, annotation: Annotation) -> AppState:
         """With a new annotation that can be undone; the redo list is cut, as everywhere."""

@@ -46,6 +46,10 @@ class Store:
         """The state now."""
         return self._state
 
+    def begin(self, state: AppState) -> None:
+        """Take another state to begin with, before the loop runs and before any view."""
+        self._state = state
+
     def add_saver(self, saver: Effect) -> None:
         """Call `saver(before, after)` after every batch of actions, on the loop, before the views render.
 

@@ -11,10 +11,12 @@ from typing import Any
 
 import job_tasks
 import pytest
-from gazeloc_app import jobs
+from gazeloc_app import job_log, jobs
 from gazeloc_app.actions.action import Action
-from gazeloc_app.actions.jobs import JobCancelling, JobEnded, JobProgressed
+from gazeloc_app.actions.jobs import JobEnded, JobProgressed
+from gazeloc_app.job_log import JobLog
 from gazeloc_app.jobs import JobRunner
+from gazeloc_app.remaining import Remaining
 from gazeloc_app.state import Level
 
 START_S = 60.0
@@ -56,7 +58,8 @@ def run(runner: JobRunner, listener: Listener, task: Any, **keywords: Any) -> Jo
 
 def test_progress_and_result_arrive(runner: JobRunner, listener: Listener, tmp_path: Path):
     runner.start("The job", job_tasks.succeed, alignment="abc")
-    assert listener.wait_for(JobProgressed) == JobProgressed(1.0, "almost")
+    progressed = listener.wait_for(JobProgressed)
+    assert (progressed.fraction, progressed.text, progressed.remaining) == (1.0, "almost", "")
     assert listener.wait_for(JobEnded) == JobEnded(Level.WARNING, f"Done in {tmp_path.name}.", "abc", True)
 
 
@@ -100,7 +103,6 @@ def test_cancel_is_answered_at_the_next_progress(runner: JobRunner, listener: Li
     listener.wait_for(JobProgressed, lambda action: action.text == "step 0")
     asked = time.monotonic()
     runner.cancel()
-    listener.wait_for(JobCancelling)
     ended = listener.wait_for(JobEnded)
     assert ended.level is Level.INFO
     assert "was cancelled" in ended.text
@@ -143,3 +145,41 @@ def test_stopping_the_app_ends_the_worker(runner: JobRunner, listener: Listener)
     runner.stop()
     with pytest.raises(ProcessLookupError):
         os.kill(worker, 0)
+
+
+def test_the_log_holds_what_the_job_reported_and_how_it_ended(runner: JobRunner, listener: Listener, tmp_path: Path):
+    run(runner, listener, job_tasks.succeed, alignment="abc")
+    run(runner, listener, job_tasks.die)
+    first, second = sorted((tmp_path / "logs").glob("*.log"))
+    lines = [line.split("  ", 1)[1] for line in first.read_text().splitlines()]
+    assert lines == ["The job begins.", "100 %  almost", f"warning: Done in {tmp_path.name}."]
+    assert "ended without an answer" in second.read_text()
+
+
+def test_logs_do_not_pile_up_and_a_folder_that_cannot_be_written_harms_nothing(tmp_path: Path):
+    for number in range(job_log.KEPT + 5):
+        JobLog(tmp_path, f"../job {number}").add("line")
+    names = [path.name for path in sorted((tmp_path / "logs").iterdir())]
+    assert len(names) == job_log.KEPT
+    assert names[-1].endswith(f"-job-{job_log.KEPT + 4}.log")
+    (tmp_path / "file").write_text("")
+    log = JobLog(tmp_path / "file", "job")
+    assert "line" in (log.add("line") or "")
+    assert log.add("line") is None
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        ([(1, 0.5)], ""),  # too early
+        ([(10, 0.05)], ""),  # too little
+        ([(s, s / 100) for s in range(0, 51, 5)], "about 50 s left"),
+        ([(s, s / 1000) for s in range(0, 501, 10)], "about 8 min left"),
+        ([(90, 0.49), (100, 0.5), (110, 0.51), (130, 0.52)], "2 to 11 min left"),  # slower now than at first
+        ([(20, 0.5), (40, 0.52), (200, 0.52)], ""),  # stands still
+        ([(20, 1.0)], ""),
+    ],
+)
+def test_the_remaining_time_is_said_as_well_as_it_is_known(steps: list[tuple[float, float]], words: str):
+    remaining = Remaining(0.0)
+    assert [remaining.after(second, fraction) for second, fraction in steps][-1] == words

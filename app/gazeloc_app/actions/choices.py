@@ -64,5 +64,7 @@ class OpenRecording:
             draws_tags=state.draws_tags,
             data_revision=state.data_revision + 1,
             renderer_note=state.renderer_note,
+            ended_jobs=state.ended_jobs,
+            offered_jobs=state.offered_jobs,
             jobs_started=state.jobs_started,
         )

@@ -1,4 +1,4 @@
-"""Long work: asked for, getting on, ended."""
+"""Long work: asked for, getting on, cancelled, ended; and what was under way when GazeLoc ended the last time."""
 
 from __future__ import annotations
 
@@ -6,49 +6,70 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gazeloc_app.state import AppState, Job, Level
+from gazeloc_app.state import AppState, EndedJob, Job, Level, Notice
+
+MAX_WAITING = 20
+MAX_LOG_LINES = 12
+_MAX_ENDED = 8
 
 
 @dataclass(frozen=True)
 class StartJob:
-    """The user asked for long work: `task` of tasks.py with its keywords. One piece at a time."""
+    """The user asked for long work: `task` of tasks.py with its keywords. One at a time, the others wait in order."""
 
     name: str
     task: Callable[..., Any]
     keywords: tuple[tuple[str, Any], ...] = ()
 
     def apply(self, state: AppState) -> AppState:
-        """The state with the job, which an effect then starts; refused while another is under way."""
-        if state.job is not None:
-            return state.noticed(Level.WARNING, f"“{state.job.name}” is still running; wait for it or cancel it.")
+        """The state with the job, which an effect then starts; the same work is not queued twice."""
         number = state.jobs_started + 1
         job = Job(self.name, self.task, self.keywords, number=number)
-        return replace(state, job=job, jobs_started=number, notice=None)
+        if any(job.is_same_work(other) for other in state.jobs):
+            return state.noticed(Level.INFO, f"“{self.name}” is under way already.")
+        if len(state.waiting_jobs) >= MAX_WAITING:
+            return state.noticed(Level.WARNING, f"{MAX_WAITING} jobs wait already; let some end first.")
+        offered = tuple(other for other in state.offered_jobs if not job.is_same_work(other))
+        state = replace(state, jobs_started=number, offered_jobs=offered)
+        if state.job is None:
+            return replace(state, job=job, notice=None)
+        state = replace(state, waiting_jobs=(*state.waiting_jobs, job))
+        return state.noticed(Level.INFO, f"“{self.name}” begins after “{state.jobs[-2].name}”.")
 
 
 @dataclass(frozen=True)
 class JobProgressed:
-    """Long work got on."""
+    """Long work got on; `line` is new in its log."""
 
     fraction: float
     text: str
+    remaining: str = ""
+    line: str | None = None
 
     def apply(self, state: AppState) -> AppState:
         """The state with the progress."""
-        return (
-            state
-            if state.job is None
-            else replace(state, job=replace(state.job, fraction=self.fraction, text=self.text))
-        )
+        if state.job is None:
+            return state
+        log = state.job.log if self.line is None else (*state.job.log, self.line)[-MAX_LOG_LINES:]
+        job = replace(state.job, fraction=self.fraction, text=self.text, remaining=self.remaining, log=log)
+        return replace(state, job=job)
 
 
 @dataclass(frozen=True)
-class JobCancelling:
-    """The user asked running work to stop."""
+class CancelJob:
+    """The user wants a job to stop, by its number: what runs is asked to (by an effect), what waits is forgotten."""
+
+    number: int
 
     def apply(self, state: AppState) -> AppState:
         """The state that says so."""
-        return state if state.job is None else replace(state, job=replace(state.job, is_cancelling=True))
+        if state.job is not None and state.job.number == self.number:
+            return replace(state, job=replace(state.job, is_cancelling=True))
+        dropped = next((job for job in state.waiting_jobs if job.number == self.number), None)
+        if dropped is None:
+            return state
+        state = replace(state, waiting_jobs=tuple(job for job in state.waiting_jobs if job is not dropped))
+        return state.noticed(Level.INFO, f"“{dropped.name}” was taken off the list.")
 
 
 @dataclass(frozen=True)
@@ -61,13 +82,54 @@ class JobEnded:
     by_person: bool = False
 
     def apply(self, state: AppState) -> AppState:
-        """The state without the job, with its news and its alignment (which can be undone).
+        """The state with the next job, the news of this one and its alignment (which can be undone).
 
         An alignment that a run suggests never replaces one that a person chose.
         """
-        state = replace(state, job=None, data_revision=state.data_revision + 1)
+        ended = state.ended_jobs
+        if state.job is not None:
+            ended = (EndedJob(state.job.name, Notice(self.level, self.text), state.job.log, state.job.number), *ended)
+        following = state.waiting_jobs[0] if state.waiting_jobs else None
+        state = replace(
+            state,
+            job=following,
+            waiting_jobs=state.waiting_jobs[1:],
+            ended_jobs=ended[:_MAX_ENDED],
+            data_revision=state.data_revision + 1,
+        )
         is_free = self.by_person or not state.annotation.alignment_by_person
         if is_free and self.alignment is not None and self.alignment != state.annotation.alignment:
             chosen = replace(state.annotation, alignment=self.alignment, alignment_by_person=self.by_person)
             state = state.annotate(chosen)
         return state.noticed(self.level, self.text)
+
+
+@dataclass(frozen=True)
+class OfferJobs:
+    """These were under way when GazeLoc ended the last time."""
+
+    jobs: tuple[Job, ...]
+
+    def apply(self, state: AppState) -> AppState:
+        """The state that offers them."""
+        return replace(state, offered_jobs=self.jobs)
+
+
+@dataclass(frozen=True)
+class ResumeJobs:
+    """The user wants to go on with what was under way."""
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with all offered jobs begun or waiting."""
+        for job in state.offered_jobs:
+            state = StartJob(job.name, job.task, job.keywords).apply(state)
+        return state
+
+
+@dataclass(frozen=True)
+class DismissJobs:
+    """The user does not want to go on with what was under way."""
+
+    def apply(self, state: AppState) -> AppState:
+        """The state without the offer."""
+        return replace(state, offered_jobs=())

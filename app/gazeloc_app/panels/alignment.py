@@ -62,7 +62,7 @@ class AlignmentPanel:
         """Show the state's alignment."""
         self._state = state
         for handle in (self._align, self._refine):
-            widgets.set_property(handle, "disabled", state.job is not None)
+            widgets.set_property(handle, "disabled", state.has_job(handle.label))
         widgets.set_value(self._live, is_following(self._data, state))
         widgets.set_content(self._note, _note_html(state.fit_note))
         seen = (state.recording, state.annotation.alignment, state.data_revision)

@@ -45,7 +45,7 @@ class ExportPanel:
         """Remember what would be exported."""
         self._recording = state.recording
         self._has_poses = self._data.poses_key(state.recording, state.annotation) is not None
-        widgets.set_property(self._button, "disabled", state.job is not None)
+        widgets.set_property(self._button, "disabled", state.has_job("Export"))
 
     def _export(self) -> None:
         formats = tuple(name for name, box in self._boxes.items() if box.value)

@@ -45,7 +45,7 @@ class FigurePanel:
         """Show the state's recording."""
         self._recording = state.recording
         for button in (self._draw, self._advise):
-            widgets.set_property(button, "disabled", state.job is not None)
+            widgets.set_property(button, "disabled", state.has_job(button.label))
         seen = (state.recording, state.data_revision)
         if seen == self._seen:
             return

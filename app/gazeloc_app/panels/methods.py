@@ -47,7 +47,7 @@ class MethodPanel:
     def render(self, state: AppState) -> None:
         """Show the state's methods."""
         self._state = state
-        widgets.set_property(self._run, "disabled", state.job is not None)
+        widgets.set_property(self._run, "disabled", state.has_job(f"Run {state.annotation.method}"))
         seen = (state.recording, state.annotation.method, state.annotation.alignment, state.data_revision)
         if seen != self._seen:
             self._seen = seen

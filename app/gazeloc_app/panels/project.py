@@ -1,4 +1,4 @@
-"""Panel: which recording, how its stages stand, running them, and the last sentence for the user."""
+"""Panel: which recording, how its stages stand, and running them."""
 
 from __future__ import annotations
 
@@ -20,32 +20,6 @@ _COLORS = {
     State.MISSING: widgets.MUTED,
     State.FAILED: widgets.BAD,
 }
-
-
-class JobBar:
-    """The running job with its progress and the cancel button, and the last notice; stays above all tabs."""
-
-    def __init__(self, gui: GuiApi, cancel: Callable[[], None]):
-        self._notice = gui.add_html("", visible=False)
-        self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self._text = gui.add_html("", visible=False)
-        self._cancel = gui.add_button("Cancel", visible=False, color="gray", hint="What was there before stays.")
-        widgets.on_user(self._cancel, lambda _: cancel(), event="on_click")
-
-    def render(self, state: AppState) -> None:
-        """Show the job and the notice of the state."""
-        notice, job = state.notice, state.job
-        if notice is not None:
-            color = widgets.LEVEL_COLORS[notice.level.value]
-            widgets.set_content(self._notice, widgets.box(widgets.colored(notice.text, color)))
-        widgets.set_property(self._notice, "visible", notice is not None)
-        for handle in (self._bar, self._text, self._cancel):
-            widgets.set_property(handle, "visible", job is not None)
-        if job is not None:
-            widgets.set_value(self._bar, round(100 * job.fraction, 1))
-            text = "Cancelling …" if job.is_cancelling else f"{job.name} · {job.text}"
-            widgets.set_content(self._text, widgets.box(widgets.text(text)))
-            widgets.set_property(self._cancel, "disabled", job.is_cancelling)
 
 
 class ProjectPanel:
@@ -77,7 +51,7 @@ class ProjectPanel:
         """Show the state's recording and how its stages stand."""
         self._state = state
         widgets.set_value(self._recording, state.recording)
-        widgets.set_property(self._run, "disabled", state.job is not None)
+        widgets.set_property(self._run, "disabled", state.has_job("Run everything"))
         seen = (state.recording, state.annotation.method, state.data_revision)
         if seen != self._seen:
             self._seen = seen
