@@ -29,13 +29,19 @@ def up_vector(up_axis: str) -> Floats:
     return vector
 
 
+def room_corners(mesh: Mesh) -> tuple[Floats, Floats]:
+    """Lowest and highest corner (3,) of the room: the 1st and the 99th percentile, single far-off points left out."""
+    low, high = np.percentile(mesh.vertices[:: max(1, len(mesh.vertices) // _SAMPLE)], [1, 99], axis=0)
+    return low, high
+
+
 def overview(mesh: Mesh, up_axis: str) -> tuple[Floats, Floats]:
     """Eye and look-at point (3,) of a view from above one corner that just has the whole room in it.
 
     Single far-off points, as scans have them, do not count: the room is between the 1st and the 99th percentile.
     """
     sample = mesh.vertices[:: max(1, len(mesh.vertices) // _SAMPLE)]
-    low, high = np.percentile(sample, [1, 99], axis=0)
+    low, high = room_corners(mesh)
     centre, up = (low + high) / 2, up_vector(up_axis)
     level = np.ones(3) - np.abs(up)
     level[np.flatnonzero(level)[0]] *= 0.7  # not along the diagonal, which would hide the corner's edges

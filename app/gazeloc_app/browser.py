@@ -10,6 +10,7 @@ import viser
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.looking import Looking
 from gazeloc_app.picking import ClickFilter
@@ -19,6 +20,7 @@ from gazeloc_app.state import AppState, Level
 from gazeloc_app.tools.all import TOOLS, shifted, tools_of
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.errors import GazelocError
+from gazeloc_core.viewpoint import room_corners
 
 SHIFT = "shift"
 
@@ -39,7 +41,9 @@ class Browser:
         self._filter = ClickFilter()
         self.looking = Looking(client, data, render, state, dispatch)
         self._add_widgets()
-        bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, lambda: bool(self._move.value))
+        cut = Cut(client, *room_corners(data.scan().mesh), data.scan().up_axis)
+        moves = lambda: bool(self._move.value)  # noqa: E731
+        bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut)
         self._tools = tools_of(bench)
         self._in_hand = self.tool
         for modifier in (None, SHIFT):

@@ -6,6 +6,7 @@ length. Angles are between rays from the same eye, so that "8 pixels beside it" 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,11 +30,18 @@ def tolerance_rad(fov_rad: float, height_px: float, radius_px: float = CLICK_RAD
     return float(np.arctan(2 * np.tan(fov_rad / 2) * radius_px / height_px))
 
 
-def pick_mesh(raycaster: Raycaster, origin: ArrayLike, direction: ArrayLike, front: int = 0) -> Floats | None:
+def pick_mesh(
+    raycaster: Raycaster,
+    origin: ArrayLike,
+    direction: ArrayLike,
+    front: int = 0,
+    leaves: Callable[[Floats], bool] = lambda _: True,
+) -> Floats | None:
     """The point (3,) where the ray first meets a face that is drawn, None for a miss.
 
     `front`: 1 where faces are drawn from the side that their normals point to, -1 from the other, 0 from both. A wall
-    that is not drawn from behind must not catch the click on what is seen through it.
+    that is not drawn from behind must not catch the click on what is seen through it. Nor must what is cut away: points
+    (3,) for which `leaves` is False.
     """
     start, ray = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     for _ in range(_MOST_FACES_PASSED):
@@ -41,7 +49,9 @@ def pick_mesh(raycaster: Raycaster, origin: ArrayLike, direction: ArrayLike, fro
         if not hits.is_hit[0]:
             return None
         if front == 0 or front * float(raycaster.normals(hits)[0] @ ray) < 0:
-            return np.asarray(raycaster.points(hits)[0], dtype=np.float64)
+            point = np.asarray(raycaster.points(hits)[0], dtype=np.float64)
+            if leaves(point):
+                return point
         start = start + ray * (float(hits.distance[0]) + _PAST_A_FACE)
     return None
 

@@ -20,6 +20,7 @@ from gazeloc_app.tools.all import TOOLS
 from gazeloc_app.tools.camera import CameraTool
 from gazeloc_app.tools.cloud_point import CloudPointTool
 from gazeloc_app.tools.frame_point import FramePointTool
+from gazeloc_app.tools.tape import TapeTool
 from gazeloc_app.tools.tool import Click, Tool
 from scipy.spatial.transform import RigidTransform
 
@@ -179,3 +180,31 @@ def test_what_a_browser_sends_for_a_ray_that_is_none_is_no_click(origin, directi
 def test_every_tool_says_in_words_of_its_own_what_it_does():
     assert len({kind.name for kind in TOOLS}) == len(TOOLS)
     assert all(kind.name[0].islower() and kind.hint.endswith(".") for kind in TOOLS)
+
+
+def test_a_tape_measures_between_two_clicks_and_rolls_up(page, scan):
+    page.data.raycaster.return_value = Raycaster(scan.mesh)
+    take(page, TapeTool)
+    page.browser._take()
+    layer = page.browser.tool._layer
+    layer.show = MagicMock()
+    click(page, np.array([0.0, 0.2, 4.0]) - EYE)
+    page.browser._filter = ClickFilter()
+    click(page, np.array([0.3, 0.6, 4.0]) - EYE)
+    (ends, text), _ = layer.show.call_args
+    np.testing.assert_allclose(ends, [[0.0, 0.2, 4.0], [0.3, 0.6, 4.0]], atol=1e-6)
+    assert text == "50.0 cm (40.0 cm up)"
+    page.browser._filter = ClickFilter()
+    click(page, ON_MESH - EYE)
+    assert len(layer.show.call_args[0][0]) == 1  # the third click starts anew
+    take(page, CameraTool)
+    page.browser._take()
+    assert layer.show.call_args[0] == ((),)
+    assert len(page.state.annotation.keypoints) == 0
+
+
+def test_shift_sets_a_point_with_the_tape_in_hand_too(page, scan):
+    page.data.raycaster.return_value = Raycaster(scan.mesh)
+    take(page, TapeTool)
+    click(page, ON_MESH - EYE, is_shifted=True)
+    assert len(page.state.annotation.keypoints) == 1

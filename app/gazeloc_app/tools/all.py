@@ -6,9 +6,10 @@ from gazeloc_app.tools.camera import CameraTool
 from gazeloc_app.tools.cloud_point import CloudPointTool
 from gazeloc_app.tools.frame_point import FramePointTool
 from gazeloc_app.tools.scan_point import ScanPointTool
+from gazeloc_app.tools.tape import TapeTool
 from gazeloc_app.tools.tool import Bench, Tool
 
-TOOLS: tuple[type[Tool], ...] = (CameraTool, ScanPointTool, CloudPointTool, FramePointTool)
+TOOLS: tuple[type[Tool], ...] = (CameraTool, ScanPointTool, CloudPointTool, FramePointTool, TapeTool)
 
 
 def tools_of(bench: Bench) -> dict[str, Tool]:
@@ -18,6 +19,6 @@ def tools_of(bench: Bench) -> dict[str, Tool]:
 
 def shifted(tool: Tool, tools: dict[str, Tool]) -> Tool:
     """What a click with the shift key uses: always a tool that sets a point, so that no mode has to be left for it."""
-    if not isinstance(tool, CameraTool):
+    if not isinstance(tool, CameraTool | TapeTool):
         return tool
     return tools[ScanPointTool.name if tool.bench.looking.target is None else FramePointTool.name]

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from gazeloc_app import picking
 from gazeloc_app.actions.action import Action
+from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.looking import Looking
 from gazeloc_app.state import AppState
@@ -57,6 +58,7 @@ class Bench:
     dispatch: Callable[[Action], None]
     front: Callable[[], int]
     moves: Callable[[], bool]
+    cut: Cut
 
     def tolerance_rad(self) -> float:
         """The angle within which a click in this browser's view means a thing."""
@@ -65,7 +67,7 @@ class Bench:
 
     def point_on_scan(self, click: Click) -> Point | None:
         """Where a click meets the scan, in metres; None beside it."""
-        found = picking.pick_mesh(self.data.raycaster(), click.origin, click.direction, front=self.front())
+        found = picking.pick_mesh(self.data.raycaster(), click.origin, click.direction, self.front(), self.cut.leaves)
         return None if found is None else as_point(found)
 
 

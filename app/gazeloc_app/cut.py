@@ -1,0 +1,91 @@
+"""Cutting the scan open, for one browser: what lies beyond the sliders is neither drawn nor clicked.
+
+Each cutting plane is an invisible node `/cut/<n>` of that browser's scene, whose z axis points to what is cut away;
+static/page/cut.js gives them to the scan's material.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import viser
+from scipy.spatial.transform import Rotation
+
+from gazeloc_app import widgets
+from gazeloc_app.scene.placing import NodeGroup
+from gazeloc_core.arrays import Floats
+from gazeloc_core.viewpoint import up_vector
+
+
+@dataclass(frozen=True)
+class Plane:
+    """What is cut away: all points with `normal` · point > `offset`, in the frame `scan`, metres."""
+
+    normal: tuple[float, float, float]
+    offset: float
+
+    def contains(self, point_in_scan: Floats) -> bool:
+        """Whether a point (3,) is left."""
+        return bool(np.dot(self.normal, point_in_scan) <= self.offset)
+
+
+class Cut:
+    """The sliders of one browser, and its planes. Ends of a slider cut nothing."""
+
+    def __init__(self, client: viser.ClientHandle, low: Floats, high: Floats, up_axis: str):
+        """`low` and `high` (3,) are the room's corners in the frame `scan`."""
+        self.planes: tuple[Plane, ...] = ()
+        self._client = client
+        self._nodes: NodeGroup[Plane] = NodeGroup(self._make_node)
+        up = up_vector(up_axis)
+        self._axes = [up, *(np.eye(3)[axis] for axis in range(3) if up[axis] == 0)]
+        self._sliders: list[Any] = []
+        with client.gui.add_folder("Cut the scan open", expand_by_default=False):
+            for axis, label in zip(self._axes, _labels(up_axis), strict=True):
+                ends = sorted((float(axis @ low), float(axis @ high)))
+                size = round(max(ends[1] - ends[0], 0.02), 2)
+                slider = client.gui.add_multi_slider(
+                    label, 0.0, size, 0.01, (0.0, size), hint="Metres that are left; in this browser only."
+                )
+                self._sliders.append((slider, ends[0], size))
+                widgets.on_user(slider, lambda _: self._changed())
+            self._whole = client.gui.add_button("Whole again", visible=False, color="gray")
+        widgets.on_user(self._whole, lambda _: self._undo(), event="on_click")
+
+    def leaves(self, point_in_scan: Floats) -> bool:
+        """Whether a point (3,) of the scan is not cut away."""
+        return all(plane.contains(point_in_scan) for plane in self.planes)
+
+    def _changed(self) -> None:
+        self.planes = tuple(
+            plane
+            for axis, (slider, start, size) in zip(self._axes, self._sliders, strict=True)
+            for plane in _planes(axis, slider.value, start, size)
+        )
+        self._nodes.show({f"/cut/{number}": plane for number, plane in enumerate(self.planes)})
+        widgets.set_property(self._whole, "visible", bool(self.planes))
+
+    def _undo(self) -> None:
+        for slider, _, size in self._sliders:
+            slider.value = (0.0, size)
+        self._changed()
+
+    def _make_node(self, name: str, plane: Plane) -> viser.FrameHandle:
+        wxyz = Rotation.align_vectors([plane.normal], [[0, 0, 1]])[0].as_quat(scalar_first=True)
+        position = plane.offset * np.array(plane.normal)
+        return self._client.scene.add_frame(name, show_axes=False, wxyz=wxyz, position=position)
+
+
+def _planes(axis: Floats, value: Sequence[float], start: float, size: float) -> list[Plane]:
+    """The planes that leave what is between two places along an axis; a browser may send them in any order."""
+    low, high = sorted(min(max(float(place), 0.0), size) for place in value)
+    x, y, z = axis.tolist()
+    planes = [Plane((x, y, z), start + high)] if high < size - 0.005 else []
+    return [*planes, Plane((-x, -y, -z), -(start + low))] if low > 0.005 else planes
+
+
+def _labels(up_axis: str) -> list[str]:
+    return ["Height", *(f"Along {axis}" for axis in "xyz" if axis != up_axis[-1])]
