@@ -39,17 +39,21 @@ from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.project import ProjectPanel
+from gazeloc_app.panels.suggestion import SuggestionPanel
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Describe, SeenTags, Sources
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
 from gazeloc_app.saving import Saver
+from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
+from gazeloc_app.suggestions import Proposals
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
+from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
 from gazeloc_core.stages import inputs
@@ -160,6 +164,8 @@ class App:
             job_logs = JobLogs(gui, str(self.project.folder / "logs"))
         with tabs.add_tab("Keypoints"):
             keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
+            ghost = SuggestionLayer(self.server.scene)
+            suggestion_panel = SuggestionPanel(gui, Proposals(self.data), dispatch, self._go_to, ghost.show)
         with tabs.add_tab("Align"):
             alignment_panel = AlignmentPanel(gui, self.data, dispatch)
         with tabs.add_tab("Methods"):
@@ -176,7 +182,7 @@ class App:
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
         side.dock_left()
         side.set_width(430)
-        work = (project_panel, keypoint_panel, alignment_panel)
+        work = (project_panel, keypoint_panel, suggestion_panel, alignment_panel)
         looks = (method_panel, figure_panel, layer_panel, camera_colors, export_panel, frame_panel)
         for panel in (job_bar, job_logs, *work, *looks):
             self.store.add_view(panel.render)
@@ -218,6 +224,11 @@ class App:
         browser = self._browsers.get(client_id)
         if browser is not None:
             browser.look(frame)
+
+    def _go_to(self, client_id: int, in_scan: Point) -> None:
+        browser = self._browsers.get(client_id)
+        if browser is not None:
+            browser.go_to(in_scan)
 
     def _open_recording(self, name: str) -> None:
         try:

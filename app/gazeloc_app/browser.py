@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
+from gazeloc_app.facing import place_to_stand
 from gazeloc_app.looking import Looking
 from gazeloc_app.picking import ClickFilter
 from gazeloc_app.render_process import RenderProcess
@@ -20,6 +22,7 @@ from gazeloc_app.state import AppState, Level
 from gazeloc_app.tools.all import TOOLS, shifted, tools_of
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.errors import GazelocError
+from gazeloc_core.keypoints import Point
 from gazeloc_core.viewpoint import room_corners
 
 SHIFT = "shift"
@@ -37,7 +40,7 @@ class Browser:
         state: Callable[[], AppState],
         dispatch: Callable[[Action], None],
     ):
-        self._client, self._dispatch = client, dispatch
+        self._client, self._data, self._state, self._dispatch = client, data, state, dispatch
         self._filter = ClickFilter()
         self.looking = Looking(client, data, render, state, dispatch)
         self._add_widgets()
@@ -71,6 +74,14 @@ class Browser:
         """Look through a frame of the recording."""
         self.looking.look(frame)
         self._show_leave()
+
+    def go_to(self, in_scan: Point) -> None:
+        """Stand before a place of the scan and look at it."""
+        self._leave_frame()
+        eye = place_to_stand(self._data, self._state(), in_scan)
+        with self._client.atomic():
+            self._client.camera.position = eye
+            self._client.camera.look_at = np.array(in_scan)
 
     def render(self, state: AppState) -> None:
         """Follow the frame slider while looking through a camera of the recording."""

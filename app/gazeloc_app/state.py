@@ -153,6 +153,8 @@ class AppState:
     """Counts how often a person switched that on, which fits the keypoints at once."""
     fit_note: str = ""
     """Why the last change of the keypoints gave no alignment; "" where it did."""
+    suggests: bool = True
+    """Whether the next best place for a keypoint is shown."""
     draws_tags: bool = False
     """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None

@@ -1,6 +1,6 @@
 """`make bench`: every number that the issue of this product and its README name, measured now, with its target.
 
-    python tests/benchmarks [alignment | scene | chair | bedroom | app | agreement | size] ...
+    python tests/benchmarks [alignment | suggestions | scene | chair | bedroom | app | agreement | size] ...
 
 Exit code 1 where a target is missed. Times are of this machine at this moment; ratios hold on noisy ones.
 """
@@ -78,8 +78,16 @@ def scene_at_size(work: Path) -> list[Row]:
     return bench_size(work)
 
 
+def suggestions(work: Path) -> list[Row]:
+    """Suggested places for keypoints, by a scripted user."""
+    from bench_suggestions import bench_suggestions
+
+    return bench_suggestions()
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
+    "suggestions": suggestions,
     "scene": whole_scene,
     "chair": real_chair,
     "bedroom": real_bedroom,

@@ -62,6 +62,7 @@ class OpenRecording:
             layers=state.layers,
             compared=state.compared,
             draws_tags=state.draws_tags,
+            suggests=state.suggests,
             data_revision=state.data_revision + 1,
             renderer_note=state.renderer_note,
             ended_jobs=state.ended_jobs,

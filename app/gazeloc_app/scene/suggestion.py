@@ -1,0 +1,44 @@
+"""The ghost of a keypoint: where it would help to click next."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from gazeloc_core.glb import Rgb
+from gazeloc_core.keypoints import Point
+
+COLOR: Rgb = (255, 0, 200)
+RADIUS_M = 0.05
+
+
+class SuggestionLayer:
+    """A see-through ball at `/suggestion`, larger than a keypoint's, with a word beside it."""
+
+    def __init__(self, scene: viser.SceneApi):
+        self._scene = scene
+        self._handles: tuple[viser.IcosphereHandle, viser.LabelHandle] | None = None
+        self._shown: Point | None = None
+
+    def show(self, in_scan: Point | None) -> None:
+        """Draw it at a place in the frame `scan`; None for none."""
+        if in_scan == self._shown:
+            return
+        self._shown = in_scan
+        if self._handles is not None and in_scan is None:
+            for handle in self._handles:
+                handle.remove()
+            self._handles = None
+        if in_scan is not None:
+            at = np.array(in_scan)
+            ball = self._scene.add_icosphere(
+                "/suggestion/ball",
+                radius=RADIUS_M,
+                color=COLOR,
+                opacity=0.4,
+                subdivisions=3,
+                position=at,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            self._handles = (ball, self._scene.add_label("/suggestion/label", "next?", position=at))
