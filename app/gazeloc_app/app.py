@@ -11,6 +11,7 @@ import signal
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -40,6 +41,7 @@ from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.panels.suggestion import SuggestionPanel
+from gazeloc_app.panels.views import ViewList
 from gazeloc_app.pictures import Pictures
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Describe, SeenTags, Sources
@@ -51,13 +53,16 @@ from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_app.suggestions import Proposals
+from gazeloc_app.view_saving import ViewSaver
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
+from gazeloc_core.saved_views import SavedView, usual_views
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.display import make_display
+from gazeloc_core.viewpoint import up_vector
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +97,9 @@ class App:
             self.data.scan()
             self._saver = Saver(project, self._say_damage)
             self._job_list = JobList(project, self._say_damage)
-            self.store.begin(self._saver.open(self.store.state.recording).put_into(self.store.state))
+            self._views = ViewSaver(project.folder, self._say_damage)
+            first = replace(self.store.state, views=self._views.read())
+            self.store.begin(self._saver.open(first.recording).put_into(first))
             self.data.recording(self.store.state.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)
             self.store.dispatch(OfferJobs(self._job_list.read()))
@@ -116,6 +123,7 @@ class App:
         self.store.add_view(self._render_browsers)
         self.store.add_saver(self._saver.commit)
         self.store.add_saver(self._job_list.save)
+        self.store.add_saver(self._views.save)
         self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
         self.store.add_effect(self.live.follow)
@@ -173,6 +181,7 @@ class App:
         with tabs.add_tab("Figures"):
             figure_panel = FigurePanel(gui, self.data, dispatch)
         with tabs.add_tab("Layers"):
+            view_list = ViewList(self.server, self._usual_views, up_vector(self.data.scan().up_axis), dispatch)
             layer_panel = LayerPanel(gui, dispatch, self.scene.facts)
             camera_colors = CameraColors(gui, self.scene.cameras, dispatch)
         with tabs.add_tab("Export"):
@@ -183,9 +192,12 @@ class App:
         side.dock_left()
         side.set_width(430)
         work = (project_panel, keypoint_panel, suggestion_panel, alignment_panel)
-        looks = (method_panel, figure_panel, layer_panel, camera_colors, export_panel, frame_panel)
+        looks = (method_panel, figure_panel, view_list, layer_panel, camera_colors, export_panel, frame_panel)
         for panel in (job_bar, job_logs, *work, *looks):
             self.store.add_view(panel.render)
+
+    def _usual_views(self) -> dict[str, SavedView]:
+        return usual_views(self.data.scan().mesh, self.data.scan().up_axis)
 
     def _routes(self) -> Routes:
         routes = Routes()

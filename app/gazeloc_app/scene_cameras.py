@@ -82,7 +82,10 @@ class SceneCameras:
     def scale(self, state: AppState) -> ColorScale | None:
         """The scale of the colours in force; None where they stand for no number, or no frame has one."""
         values = self._values(state, state.annotation.method)
-        return None if values is None else ColorScale.of_errors(values)
+        if values is None:
+            return None
+        is_error = state.layers.coloring is Coloring.ERROR
+        return ColorScale.of_errors(values) if is_error else ColorScale.of_range(values)
 
     def _draw_phone(self, state: AppState) -> None:
         scan, tint = self._data.scan(), state.layers.tint(Layer.PHONE)
@@ -147,7 +150,14 @@ class SceneCameras:
 
     def _values(self, state: AppState, method: Method) -> Floats | None:
         """The number (N,) of each frame that the colours stand for, NaN where there is none."""
-        return self._errors(state, method) if state.layers.coloring is Coloring.ERROR else None
+        match state.layers.coloring:
+            case Coloring.ERROR:
+                return self._errors(state, method)
+            case Coloring.SCORE:
+                key = self._data.poses_key(state.recording, state.annotation, method)
+                scores = self._data.frame_scores(state.recording, key)
+                return None if scores is None else scores.score
+        return None
 
     def _errors(self, state: AppState, method: Method | None) -> Floats | None:
         key = self._data.poses_key(state.recording, state.annotation, method)

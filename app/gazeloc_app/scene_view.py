@@ -22,6 +22,7 @@ from gazeloc_app.scan_screen import ScanScreen
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
 from gazeloc_app.scene.gaze import GazeLayer
+from gazeloc_app.scene.grid import GridLayer
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import TagsLayer
@@ -35,6 +36,7 @@ from gazeloc_core.scan_display import glimpse
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
+from gazeloc_core.viewpoint import room_corners
 
 SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
 WHITE = (255, 255, 255)
@@ -65,6 +67,7 @@ class SceneView:
         self.front = 0
         """Which side of the scan's faces is drawn: 1 where their normals point to, -1 the other, 0 both."""
         self._room = RoomLayer(scene)
+        self._grid = GridLayer(scene)
         self._glimpse = CloudLayer(scene, "/scan-glimpse", point_size_m=0.015)
         self._cloud = CloudLayer(scene)
         self._tag_points = CloudLayer(scene, "/sfm/tag-points", point_size_m=0.022)
@@ -110,6 +113,7 @@ class SceneView:
                 self._render.reopen()
             self._mesh = mesh
             set_start(self._server, mesh, self._data.scan().up_axis)
+            self._grid.show(*room_corners(mesh), self._data.scan().up_axis)
         display = self._screen.display()
         if display is not None:
             self.front = display.front
@@ -187,6 +191,7 @@ class SceneView:
             Layer.TAG_POINTS: (self._tag_points,),
             Layer.GAZE: (self._gaze,),
             Layer.ERRORS: (self.cameras.errors,),
+            Layer.GRID: (self._grid,),
         }
         for layer, parts in layers.items():
             is_visible = state.layers.is_visible(layer)

@@ -14,6 +14,7 @@ from typing import Any
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
+from gazeloc_core.saved_views import SavedView
 
 
 class Layer(StrEnum):
@@ -30,6 +31,7 @@ class Layer(StrEnum):
     TAG_POINTS = "Points under tags"
     GAZE = "Gaze"
     ERRORS = "Errors"
+    GRID = "Grid"
 
 
 class Coloring(StrEnum):
@@ -38,6 +40,7 @@ class Coloring(StrEnum):
     SET = "method"
     STATUS = "status"
     ERROR = "error"
+    SCORE = "agreement"
 
 
 class Level(StrEnum):
@@ -106,7 +109,7 @@ class Annotation:
 class LayerSettings:
     """Which layers show, and how they are tinted (RGB; None for a layer's own colours)."""
 
-    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS})
+    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS, Layer.GRID})
     tints: tuple[tuple[Layer, tuple[int, int, int]], ...] = ()
     coloring: Coloring = Coloring.SET
     thinning: int | None = None
@@ -155,6 +158,8 @@ class AppState:
     """Why the last change of the keypoints gave no alignment; "" where it did."""
     suggests: bool = True
     """Whether the next best place for a keypoint is shown."""
+    views: tuple[SavedView, ...] = ()
+    """Places to look at the room from that people saved; shared by all recordings."""
     draws_tags: bool = False
     """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None

@@ -7,6 +7,7 @@ from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import FrameInSceneLayer, SelectedFrameLayer, look_through, picture_plane
 from gazeloc_app.scene.frusta import EDGES, CameraSet, FrustaLayer, frustum_points
 from gazeloc_app.scene.gaze import GazeLayer
+from gazeloc_app.scene.grid import GridLayer, grid_lines
 from gazeloc_app.scene.keypoints import SELECTED, KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import SCAN_TAGS, TagsLayer
@@ -201,6 +202,26 @@ def test_what_is_hidden_stays_hidden_when_it_changes(server, sent):
     layer.set_visible(False)
     layer.show(KeypointSet((KeypointPair("k1", "desk", (1, 1, 1)),)), None)
     assert not server.scene._handle_from_node_name["/keypoints/k1/scan"].visible
+
+
+@pytest.mark.parametrize(("up_axis", "floor"), [("z", -0.995), ("-z", 2.395), ("y", -2.995)])
+def test_the_grid_lies_on_the_floor_in_whole_metres(server, sent, up_axis, floor):
+    low, high = np.array([0.2, -3.0, -1.0]), np.array([3.4, 1.0, 2.4])
+    height = "xyz".index(up_axis[-1])
+    lines, colors = grid_lines(low, high, up_axis)
+    ground = np.delete(lines[:-3], height, axis=2)
+    np.testing.assert_allclose(lines[:-3, :, height], floor)
+    np.testing.assert_array_equal(ground, np.rint(ground))
+    assert (ground.min(axis=(0, 1)) <= np.delete(low, height)).all()
+    assert (ground.max(axis=(0, 1)) >= np.delete(high, height)).all()
+    np.testing.assert_allclose(lines[-3:, 1] - lines[-3:, 0], np.eye(3))
+    assert len(colors) == len(lines)
+    layer = GridLayer(server.scene)
+    layer.set_visible(False)
+    layer.show(low, high, up_axis)
+    assert {"/grid", "/grid-x", "/grid-y", "/grid-z"} <= names(server)
+    assert not server.scene._handle_from_node_name["/grid"].visible
+    assert "".join(node.text for node in layer._nodes[1:] if len(node.text) > 1) in (f"{up_axis} ↑", f"{up_axis[1:]} ↓")
 
 
 def test_gaze_shows_a_hit_only_where_there_is_one(server, sent):

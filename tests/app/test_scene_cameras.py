@@ -2,6 +2,7 @@
 
 import json
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -121,3 +122,16 @@ def test_the_legend_says_what_colours_mean(app):
     assert "ground truth" in legend(Coloring.ERROR, None)
     step(app, ColorCameras(Coloring.ERROR))
     assert "5 cm and more" in legend(Coloring.ERROR, app.scene.cameras.scale(app.store.state))
+
+
+def test_colours_stand_for_the_agreement_where_it_is_known(app, monkeypatch):
+    step(app, ColorCameras(Coloring.SCORE))
+    assert app.scene.cameras.scale(app.store.state) is None
+    assert "no scores yet" in legend(Coloring.SCORE, None)
+    scores = np.linspace(0.2, 0.9, len(app.data.recording("walk")))
+    monkeypatch.setattr(app.data, "frame_scores", lambda *_: SimpleNamespace(score=scores))
+    app.store._render()
+    scale = app.scene.cameras.scale(app.store.state)
+    colors = lines_of(app, "/frusta/estimate")[1]
+    assert np.abs(colors[:6] - linear_from_srgb(scale.colors([0.2])[0])).max() < 1e-4
+    assert "0.21 and less" in legend(Coloring.SCORE, scale)

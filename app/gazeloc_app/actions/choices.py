@@ -61,6 +61,7 @@ class OpenRecording:
             self.history().put_into(AppState(state.recordings, self.recording)),
             layers=state.layers,
             compared=state.compared,
+            views=state.views,
             draws_tags=state.draws_tags,
             suggests=state.suggests,
             data_revision=state.data_revision + 1,

@@ -13,6 +13,11 @@ from gazeloc_app.scene_cameras import STATUS_COLORS, SceneCameras
 from gazeloc_app.state import AppState, Coloring
 from gazeloc_core.color_scale import NO_VALUE, ColorScale
 
+_NONE = {
+    Coloring.ERROR: "No frame has a ground truth to be measured against.",
+    Coloring.SCORE: "These poses have no scores yet; they are made by the stage that scores frames.",
+}
+
 
 class CameraColors:
     """The slider, the choice of colours, and the legend."""
@@ -24,7 +29,7 @@ class CameraColors:
                 "Colour by",
                 tuple(coloring.value for coloring in Coloring),
                 hint="Method: one colour for each. Status: how a frame came by its pose. "
-                "Error: distance from the ground truth.",
+                "Error: distance from the ground truth. Agreement: how well frame and render agree, more is better.",
             )
             self._legend = gui.add_html("")
             self._thinning = gui.add_slider(
@@ -60,9 +65,12 @@ def legend(coloring: Coloring, scale: ColorScale | None) -> str:
         ]
         return widgets.box(" &nbsp; ".join(entries))
     if scale is None:
-        return widgets.box("No frame that is drawn has a ground truth to be measured against.")
+        return widgets.box(_NONE[coloring])
     bar = f'<div style="height:10px;border-radius:2px;background:{ColorScale.css_gradient()}"></div>'
-    ends = f"<span>{100 * scale.low:.4g} cm</span><span>{100 * scale.high:.4g} cm and more</span>"
+    low, high = f"{100 * scale.low:.4g} cm", f"{100 * scale.high:.4g} cm and more"
+    if coloring is Coloring.SCORE:
+        low, high = f"{scale.low:.2f} and less", f"{scale.high:.2f} and more"
+    ends = f"<span>{low}</span><span>{high}</span>"
     row = f'<div style="display:flex;justify-content:space-between">{ends}</div>'
     return widgets.box(f"{bar}{row}{_swatch(NO_VALUE)} not known")
 

@@ -24,6 +24,7 @@ HINTS = {
     Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, pink the selected pair.",
     Layer.TAG_POINTS: "The reconstruction's points under tags; those that the paper's filter drops are grey.",
     Layer.ERRORS: "Lines from the estimated cameras to the true ones, coloured by their length.",
+    Layer.GRID: "Squares of one metre on the floor, and the scan's axes; an arrow marks the one that is up.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
