@@ -1,6 +1,6 @@
 """`make bench`: every number that the issue of this product and its README name, measured now, with its target.
 
-    python tests/benchmarks [alignment | suggestions | scene | chair | bedroom | app | agreement | size] ...
+    python tests/benchmarks [alignment | suggestions | scene | chair | bedroom | app | agreement | size | door] ...
 
 Exit code 1 where a target is missed. Times are of this machine at this moment; ratios hold on noisy ones.
 """
@@ -85,6 +85,13 @@ def suggestions(work: Path) -> list[Row]:
     return bench_suggestions()
 
 
+def door(work: Path) -> list[Row]:
+    """Hostile visitors, each refused, and what a flood costs the others."""
+    from bench_door import bench_door
+
+    return bench_door(work)
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
     "suggestions": suggestions,
@@ -94,6 +101,7 @@ BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "app": browser_app,
     "agreement": agreement,
     "size": scene_at_size,
+    "door": door,
 }
 
 
