@@ -36,6 +36,7 @@ from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
+from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.methods import MethodPanel
@@ -174,6 +175,7 @@ class App:
             keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
             ghost = SuggestionLayer(self.server.scene)
             suggestion_panel = SuggestionPanel(gui, Proposals(self.data), dispatch, self._go_to, ghost.show)
+            keypoint_files = KeypointFiles(gui, state, dispatch)
         with tabs.add_tab("Align"):
             alignment_panel = AlignmentPanel(gui, self.data, dispatch)
         with tabs.add_tab("Methods"):
@@ -191,7 +193,7 @@ class App:
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
         side.dock_left()
         side.set_width(430)
-        work = (project_panel, keypoint_panel, suggestion_panel, alignment_panel)
+        work = (project_panel, keypoint_panel, keypoint_files, suggestion_panel, alignment_panel)
         looks = (method_panel, figure_panel, view_list, layer_panel, camera_colors, export_panel, frame_panel)
         for panel in (job_bar, job_logs, *work, *looks):
             self.store.add_view(panel.render)

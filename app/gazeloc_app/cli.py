@@ -1,5 +1,5 @@
-"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | export | tags | advise |
-demo`.
+"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | keypoints | export | tags |
+advise | demo`.
 
 Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
 code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
@@ -11,59 +11,29 @@ command imported and run.
 from __future__ import annotations
 
 import contextlib
-import functools
 import io
 import os
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from gazeloc_app.arguments import (
+    AllowedHosts,
+    Command,
+    Flag,
+    OptionalName,
+    OptionalPath,
+    OptionalText,
+    Project,
+    TagSize,
+    deferred,
+)
 from gazeloc_app.door.address import check_address
 from gazeloc_core import __version__
 from gazeloc_core.errors import Cancelled, GazelocError, InputError
-
-TAG_SIZE_HELP = """Metres between the corners that the detector reports. For tag36h11 and its kin that is the outer \
-edge of the black square, for the tagStandard and tagCircle families the *inner* square, not the printed edge \
-(. is data):
-
-tag36h11            tagStandard41h12
-# # # # # # # #     . . . . . . . . .
-# . . . . . . #     . # # # # # # # .
-# . . . . . . #     . #           # .
-# . . . . . . #     . #   . . .   # .
-# . . . . . . #     . #   . . .   # .
-# . . . . . . #     . #   . . .   # .
-# . . . . . . #     . #           # .
-# # # # # # # #     . # # # # # # # .
-<---- size --->     . . . . . . . . .
-                       <- size -->
-
-"""
-
-Command = Callable[[], None]
-Project = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PROJECT", help="The project folder.")]
-OptionalPath = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
-OptionalText = Annotated[str | None, tyro.conf.arg(metavar="TEXT")]
-OptionalName = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
-TagSize = Annotated[float | None, tyro.conf.arg(metavar="METRES", help=TAG_SIZE_HELP)]
-AllowedHosts = Annotated[
-    tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME", help_behavior_hint="")
-]
-Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
-
-
-def deferred(command: Callable[..., None]) -> Callable[..., Command]:
-    """The command with its arguments, to be run once parsing has ended."""
-
-    @functools.wraps(command)
-    def bind(*values: Any, **named: Any) -> Command:
-        return functools.partial(command, *values, **named)
-
-    return bind
 
 
 @deferred
@@ -258,6 +228,34 @@ def export(
 
 
 @deferred
+def keypoints(
+    action: Annotated[Literal["import", "export"], tyro.conf.Positional],
+    project: Project,
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")],
+    *,
+    recording: OptionalName = None,
+    side: Literal["scan", "sfm"] = "scan",
+    format: OptionalName = None,
+) -> None:
+    """Bring clicked keypoints from or to a file: JSON, CSV, CloudCompare's picked points, Stray's keypoints.json.
+
+    Args:
+        action: What to do: import or export.
+        project: The project folder.
+        file: The file to read, or to write.
+        recording: Whose keypoints; needed where there are several recordings.
+        side: Which side a list of one side is of (import).
+        format: json, csv, cloudcompare-scan, cloudcompare-sfm, stray-scan or stray-sfm (export); else by the ending.
+    """
+    from gazeloc_app import keypoint_commands
+
+    if action == "import":
+        keypoint_commands.import_keypoints(project, file, recording=recording, side=side)
+    else:
+        keypoint_commands.export_keypoints(project, file, recording=recording, format=format)
+
+
+@deferred
 def tags(
     action: Annotated[Literal["print"], tyro.conf.Positional],
     *,
@@ -324,6 +322,7 @@ COMMANDS: dict[str, Any] = {
     "evaluate": evaluate,
     "protocol": protocol,
     "export": export,
+    "keypoints": keypoints,
     "tags": tags,
     "advise": advise,
     "demo": demo,

@@ -1,0 +1,25 @@
+"""Keypoints that came from a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gazeloc_app.state import AppState, Level
+from gazeloc_core.keypoint_files import merged
+from gazeloc_core.keypoints import KeypointSet
+
+
+@dataclass(frozen=True)
+class ImportKeypoints:
+    """Keypoints were read from a file named `source`."""
+
+    read: KeypointSet
+    source: str
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with them among the others (see `merged`), one step to undo."""
+        before = state.annotation.keypoints
+        after = merged(before, self.read)
+        added = len(after) - len(before)
+        text = f"{self.source}: {len(self.read)} keypoints, {added} of them new."
+        return state.with_keypoints(after).noticed(Level.INFO, text)

@@ -1,0 +1,52 @@
+"""`gazeloc keypoints import` and `export`: clicked keypoints from and to files, by the functions of the app."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gazeloc_core.errors import InputError, ProjectError
+from gazeloc_core.files import write_text_atomically
+from gazeloc_core.keypoint_files import WRITERS, SideName, merged, read_keypoints
+from gazeloc_core.project import Project
+from gazeloc_core.user_files import read_bytes
+
+
+def import_keypoints(folder: Path, file: Path, *, recording: str | None, side: SideName) -> None:
+    """Merge the keypoints of a file into the recording's, and say how many there are now."""
+    project = Project.open(folder)
+    name = _recording(project, recording)
+    read = read_keypoints(str(file), read_bytes(file), side)
+    with project.lock():
+        before = project.keypoints(name)
+        after = merged(before, read)
+        project.save_keypoints(name, after)
+    counting = sum(pair.counts for pair in after)
+    print(f"{name}: {len(read)} keypoints from {file}, {len(after) - len(before)} of them new; {counting} pairs count.")
+
+
+def export_keypoints(folder: Path, file: Path, *, recording: str | None, format: str | None) -> None:
+    """Write the recording's keypoints to a file, in the format named or that of the file's ending."""
+    project = Project.open(folder)
+    name = _recording(project, recording)
+    chosen = format or {".json": "json", ".csv": "csv"}.get(file.suffix.lower(), "")
+    if chosen not in WRITERS:
+        raise InputError(f"--format {chosen or file.name}: choose one of {', '.join(WRITERS)}.")
+    keypoints = project.keypoints(name)
+    if len(keypoints) == 0:
+        raise ProjectError(f"{name}: there is no keypoint to export; click some in the app (`gazeloc view`).")
+    try:
+        write_text_atomically(file, WRITERS[chosen][1](keypoints))
+    except OSError as error:
+        raise InputError.of(file, f"it cannot be written ({error.strerror})", "name another file") from error
+    print(f"{file}: {len(keypoints)} keypoints.")
+
+
+def _recording(project: Project, name: str | None) -> str:
+    """The recording that is meant: the one named, or the only one."""
+    names = tuple(project.settings.recordings)
+    if name is None and len(names) == 1:
+        return names[0]
+    if name is None:
+        raise InputError(f"{project.folder}: there are {len(names)} recordings, name one with --recording.")
+    project.recording(name)
+    return name

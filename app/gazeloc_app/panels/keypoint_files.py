@@ -1,0 +1,64 @@
+"""Part of the panel of keypoints: reading them from a file, and saving them as one, on the computer of the browser."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from viser import GuiApi
+
+from gazeloc_app import widgets
+from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.files import ImportKeypoints
+from gazeloc_app.state import AppState, Level
+from gazeloc_core.errors import InputError
+from gazeloc_core.keypoint_files import WRITERS, SideName, read_keypoints
+
+SIDES: dict[str, SideName] = {"the scan": "scan", "the reconstruction": "sfm"}
+FORMATS = {
+    "JSON, everything": "json",
+    "CSV": "csv",
+    "CloudCompare, on the scan": "cloudcompare-scan",
+    "CloudCompare, in the reconstruction": "cloudcompare-sfm",
+    "Stray, on the scan": "stray-scan",
+    "Stray, in the reconstruction": "stray-sfm",
+}
+
+
+class KeypointFiles:
+    """Import by an upload, export by a download; nothing is written on the server."""
+
+    def __init__(self, gui: GuiApi, state: AppState, dispatch: Callable[[Action], None]):
+        self._state, self._dispatch = state, dispatch
+        with gui.add_folder("Files", expand_by_default=False):
+            self._side = gui.add_dropdown(
+                "Lists are of",
+                tuple(SIDES),
+                hint="Lists of CloudCompare and Stray hold one side. Pairs of the same name get it, others are added.",
+            )
+            self._upload: Any = gui.add_upload_button(
+                "Read keypoints", hint="JSON, CSV, a list picked in CloudCompare, Stray's keypoints.json. One undo."
+            )
+            self._format = gui.add_dropdown("Format", tuple(FORMATS))
+            self._save = gui.add_button("Save keypoints", color="gray", hint="Saves a file on your computer.")
+        widgets.on_user(self._upload, lambda event: self._read(event.target.value), event="on_upload")
+        widgets.on_user(self._save, lambda event: self._send(event.client), event="on_click")
+
+    def render(self, state: AppState) -> None:
+        """Remember what would be saved."""
+        self._state = state
+        widgets.set_property(self._save, "disabled", len(state.annotation.keypoints) == 0)
+
+    def _read(self, file: Any) -> None:
+        name = " ".join(str(file.name).split())[:80]
+        side = SIDES.get(str(self._side.value), "scan")
+        try:
+            self._dispatch(ImportKeypoints(read_keypoints(name, bytes(file.content), side), name))
+        except InputError as error:
+            self._dispatch(Notify(Level.ERROR, str(error)))
+
+    def _send(self, client: Any) -> None:
+        ending, write = WRITERS[FORMATS.get(str(self._format.value), "json")]
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", self._state.recording)
+        client.send_file_download(f"{stem}-keypoints{ending}", write(self._state.annotation.keypoints).encode())

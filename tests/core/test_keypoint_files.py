@@ -1,0 +1,112 @@
+"""Keypoints through files: nothing is lost on the way, other programs' lists are read, bad files are one sentence."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from gazeloc_core.errors import InputError
+from gazeloc_core.keypoint_files import WRITERS, merged, read_keypoints
+from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
+
+PAIRS = KeypointSet(
+    (
+        KeypointPair("k1", "lamp, left", (1.25, -2.0, 0.1 + 0.2), (0.5, 1e-7, 3.0), enabled=False),
+        KeypointPair("k2", "tag “4”", None, (1.0, 2.0, 3.0), (Sighting(3, 10.5, 20.25), Sighting(9, 1.0, 2.0)), 0.01),
+        KeypointPair("k3", "corner", (0.0, 1.0, 2.0), None, (), None, True, (Sighting(0, 5.0, 6.0),), None),
+    )
+)
+
+
+def through(format_name, keypoints=PAIRS, side="scan"):
+    return read_keypoints("file", WRITERS[format_name][1](keypoints).encode(), side)
+
+
+def test_json_keeps_everything():
+    assert through("json") == PAIRS
+
+
+def test_csv_keeps_names_sides_and_switches_to_the_last_bit():
+    assert [(p.name, p.scan, p.sfm, p.enabled) for p in through("csv")] == [
+        (p.name, p.scan, p.sfm, p.enabled) for p in PAIRS
+    ]
+
+
+@pytest.mark.parametrize("side", ["scan", "sfm"])
+def test_lists_of_one_side_put_together_are_the_pairs(side):
+    read = through(f"cloudcompare-{side}", side=side)
+    expected = [(p.name.replace(",", ""), getattr(p, side)) for p in PAIRS if getattr(p, side)]
+    assert [(p.name, getattr(p, side)) for p in read] == expected
+    read = through(f"stray-{side}", side=side)
+    assert [getattr(p, side) for p in read] == [getattr(p, side) for p in PAIRS if getattr(p, side)]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("1,2,3\n4,5,6\n", ["Point 1", "Point 2"]),
+        ("0,1,2,3\n7,4,5,6\n", ["Point 0", "Point 7"]),
+        ("R0,1,2,3\nR1,4,5,6\n", ["R0", "R1"]),
+        ("12,R0,1,2,3\n99,R1,4,5,6\n", ["R0", "R1"]),
+        ("// picked\n1 2 3\n\n4\t5\t6\n", ["Point 1", "Point 2"]),
+    ],
+)
+def test_every_form_of_cloudcompares_list_is_read(text, names):
+    read = read_keypoints("list.txt", text.encode(), "scan")
+    assert [(p.name, p.scan) for p in read] == list(zip(names, [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)], strict=True))
+
+
+def test_what_is_read_completes_pairs_of_the_same_name_and_is_added_else_and_twice_is_once():
+    scan = read_keypoints("scan.txt", b"R0,1,2,3\nR1,4,5,6\n", "scan")
+    sfm = read_keypoints("sfm.txt", b"R1,7,8,9\nR2,1,1,1\n", "sfm")
+    both = merged(merged(PAIRS, scan), sfm)
+    assert both.pairs[:3] == PAIRS.pairs
+    assert [(p.key, p.name, p.scan, p.sfm) for p in both.pairs[3:]] == [
+        ("k4", "R0", (1, 2, 3), None),
+        ("k5", "R1", (4, 5, 6), (7, 8, 9)),
+        ("k6", "R2", None, (1, 1, 1)),
+    ]
+    assert merged(merged(both, scan), sfm) == both
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "no keypoint"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (b"{", "JSON"),
+        (b"[1, 2]", "garbled"),
+        (b'[{"key": "k1"}]', "garbled"),
+        (b'{"keypoints": 5}', "no list"),
+        (b'{"keypoints": [{"position": [1, 2]}]}', "keypoint 1"),
+        (b'{"keypoints": [{"position": [1, 2, NaN]}]}', "no place"),
+        (b'{"keypoints": [{"position": "abc"}]}', "keypoint 1"),
+        (b"1,2\n", "line 1"),
+        (b"1,2,3\na,b,c\n", "line 2"),
+        (b"1,2,1e30\n", "no place"),
+        (b"name,enabled,x\n1,1,1\n", "header"),
+        (",".join(("name", "enabled", "scan_x_m", "scan_y_m", "scan_z_m", "sfm_x", "sfm_y", "sfm_z")).encode(), "no "),
+        (b"name,enabled,scan_x_m,scan_y_m,scan_z_m,sfm_x,sfm_y,sfm_z\na,2,1,2,3,1,2,3\n", "row 2"),
+        (b"name,enabled,scan_x_m,scan_y_m,scan_z_m,sfm_x,sfm_y,sfm_z\na,1,1,2,,1,2,3\n", "row 2"),
+        (b"name,enabled,scan_x_m,scan_y_m,scan_z_m,sfm_x,sfm_y,sfm_z\na,1,1\n", "row 2"),
+        (b"1,2,3\n" * 5001, "5001"),
+        (b"1" * 4_000_001, "MB"),
+        (b"[" * 100_000, "JSON"),
+    ],
+)
+def test_a_bad_file_is_one_sentence_with_its_name(content, said):
+    with pytest.raises(InputError) as caught:
+        read_keypoints("bad.file", content, "scan")
+    sentence = str(caught.value)
+    assert sentence.startswith("bad.file: ")
+    assert said in sentence
+    assert sentence.count("\n") == 0
+    assert len(sentence) < 400
+
+
+def test_clicks_that_are_none_are_refused():
+    pairs = PAIRS.to_json()
+    pairs[1]["sightings"][0]["frame_index"] = -1
+    with pytest.raises(InputError, match="click"):
+        read_keypoints("f.json", json.dumps(pairs).encode(), "scan")
