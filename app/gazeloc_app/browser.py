@@ -15,6 +15,7 @@ from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.facing import place_to_stand
 from gazeloc_app.looking import Looking
+from gazeloc_app.panels.looking import LookingControls
 from gazeloc_app.picking import ClickFilter
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.scene_view import SceneView
@@ -44,6 +45,7 @@ class Browser:
         self._filter = ClickFilter()
         self.looking = Looking(client, data, render, state, dispatch)
         self._add_widgets()
+        self._controls = LookingControls(client, data, self.looking, state, dispatch)
         cut = Cut(client, *room_corners(data.scan().mesh), data.scan().up_axis)
         moves = lambda: bool(self._move.value)  # noqa: E731
         bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut)
@@ -66,26 +68,27 @@ class Browser:
             action = tool.click(click)
         except GazelocError as error:
             action = Notify(Level.ERROR, str(error))
-        self._show_leave()
+        self._controls.render(self._state())
         if action is not None:
             self._dispatch(action)
 
     def look(self, frame: int) -> None:
         """Look through a frame of the recording."""
         self.looking.look(frame)
-        self._show_leave()
+        self._controls.render(self._state())
 
     def go_to(self, in_scan: Point) -> None:
         """Stand before a place of the scan and look at it."""
-        self._leave_frame()
+        self._controls.leave()
         eye = place_to_stand(self._data, self._state(), in_scan)
         with self._client.atomic():
             self._client.camera.position = eye
             self._client.camera.look_at = np.array(in_scan)
 
     def render(self, state: AppState) -> None:
-        """Follow the frame slider while looking through a camera of the recording."""
+        """Follow the frame slider while looking through a camera of the recording; show the keypoints in it."""
         self.looking.follow(state)
+        self._controls.render(state)
 
     def _add_widgets(self) -> None:
         gui = self._client.gui
@@ -96,9 +99,7 @@ class Browser:
             hint=f"In this browser only; the key P goes on. Dragging always orbits. {hints}",
         )
         self._move = gui.add_checkbox("Move point", False, hint="The click moves the selected pair's point.")
-        self._leave = gui.add_button("Leave the frame", visible=False, color="gray")
         widgets.on_user(self._choice, lambda _: self._take())
-        widgets.on_user(self._leave, lambda _: self._leave_frame(), event="on_click")
         toggle = gui.add_command("Next tool", hotkey="P", description="What a click does")
         widgets.on_user(toggle, lambda _: self._next_tool(), event="on_trigger")
 
@@ -120,10 +121,3 @@ class Browser:
         self._choice.value = names[(names.index(self.tool.name) + 1) % len(names)]
         self._take()
         self._client.add_notification("Tool", f"A click {self.tool.name}.", auto_close_seconds=2.5)
-
-    def _leave_frame(self) -> None:
-        self.looking.leave()
-        self._show_leave()
-
-    def _show_leave(self) -> None:
-        widgets.set_property(self._leave, "visible", self.looking.target is not None)

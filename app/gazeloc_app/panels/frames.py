@@ -15,11 +15,15 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.picks import Side
 from gazeloc_app.actions.views import DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
+from gazeloc_app.frame_marks import marks_in_frame
 from gazeloc_app.gaze_at import gaze_in_frame
+from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.sightings import image_of_frame
-from gazeloc_app.state import AppState
+from gazeloc_app.state import AppState, Layer
+from gazeloc_core.camera import Camera
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 STRIP_PARTS = 300
@@ -75,7 +79,9 @@ class FramePanel:
         """Show the state's frame."""
         self._state = state
         key = self._data.poses_key(state.recording, state.annotation)
-        seen = (state.recording, state.frame, key, state.data_revision, state.renderer_note, state.draws_tags)
+        keypoints = (state.annotation.keypoints, state.selected_key, state.layers.is_visible(Layer.KEYPOINTS))
+        shown = (state.recording, state.frame, key, state.data_revision, state.renderer_note, state.draws_tags)
+        seen = (shown, keypoints)
         if seen == self._seen:
             return
         self._seen = seen
@@ -120,7 +126,12 @@ class FramePanel:
         content = self._template
         for key, value in values.items():
             content = content.replace(f"@{key}@", widgets.text(value))
-        return content
+        return content.replace("@KEYPOINTS@", self._keypoints_svg(state, frame, camera))
+
+    def _keypoints_svg(self, state: AppState, frame: int, camera: Camera | None) -> str:
+        if camera is None or not state.layers.is_visible(Layer.KEYPOINTS):
+            return ""
+        return marks_svg(*marks_in_frame(self._data, state, Side.SFM, frame), camera, state.selected_key)
 
     def _error_text(self, state: AppState, frame: int) -> str:
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))

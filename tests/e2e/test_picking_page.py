@@ -1,0 +1,61 @@
+"""Picking in a real browser: shift-click, and clicking one spot in two of the phone's pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app_project import make_app_project
+from e2e.app_page import AppPage
+from e2e.phone_photos import add_photos
+from gazeloc_app.app import App
+from gazeloc_app.scene.frames import PLANE_M
+from gazeloc_app.tools.camera import CameraTool
+
+pytestmark = pytest.mark.e2e
+
+SPOT = np.array([1.1, 0.3, 0.75])
+WALL = np.array([1.5, 0.0, 1.9])
+
+
+@pytest.fixture
+def page(tmp_path, open_page):
+    app = App(make_app_project(tmp_path, tags=False), port=0)
+    add_photos(app, tmp_path)
+    app.start()
+    viewer = open_page(app.address, width=1360, height=760).wait_until_drawn(300).wait_for_clicks()
+    yield AppPage(viewer, app)
+    app.stop()
+
+
+def test_a_click_with_shift_sets_a_point_on_the_scan_while_a_plain_one_sets_none(page):
+    page.viewer.click_at_point(WALL)
+    page.page.wait_for_timeout(600)
+    assert not page.pairs
+    page.viewer.click_at_point(WALL, modifiers=("Shift",))
+    page.until(lambda: len(page.pairs) == 1)
+    assert np.linalg.norm(np.array(page.pairs[0].scan) - WALL) < 0.01
+    assert page.field("A click").input_value() == CameraTool.name
+
+
+def test_one_spot_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page):
+    for number in (1, 2):
+        page.field("Phone's frame").fill(str(number))
+        page.field("Phone's frame").press("Enter")
+        page.viewer.wait_for_node("/picture")
+        view = page.app.data.scan().frames_with_images[number]
+        local = view.scan_from_camera.inv().apply(SPOT)
+        on_picture = view.scan_from_camera.apply(local / local[2] * PLANE_M)
+        page.until(
+            lambda number=number: any(
+                browser.looking.target and browser.looking.target.frame == number
+                for browser in page.app._browsers.values()
+            )
+        )
+        page.viewer.wait_until_drawn(300)
+        page.viewer.click_at_point(on_picture, modifiers=("Shift",))
+        page.until(lambda number=number: page.pairs and len(page.pairs[0].scan_sightings) == number)
+        page.viewer.wait_for_node("/picture-marks/lines")
+        page.viewer.save(f"app-phone-{number}")
+    assert np.linalg.norm(np.array(page.pairs[0].scan) - SPOT) < 0.02
+    page.press("Leave the frame")
+    page.viewer.wait_for_node("/picture", present=False).wait_for_node("/picture-marks/lines", present=False)
