@@ -40,10 +40,12 @@ from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.methods import MethodPanel
+from gazeloc_app.panels.problems import ProblemPanel
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.panels.suggestion import SuggestionPanel
 from gazeloc_app.panels.views import ViewList
 from gazeloc_app.pictures import Pictures
+from gazeloc_app.player import Player
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Describe, SeenTags, Sources
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
@@ -51,6 +53,7 @@ from gazeloc_app.saving import Saver
 from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
+from gazeloc_app.show_route import add_show_route
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_app.suggestions import Proposals
@@ -120,6 +123,7 @@ class App:
         self._last_job = 0
         self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch)
         self.store.add_view(self.scene.render)
+        self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
         self._build_panels()
         self.store.add_view(self._render_browsers)
         self.store.add_saver(self._saver.commit)
@@ -130,6 +134,7 @@ class App:
         self.store.add_effect(self.live.follow)
         self.store.add_effect(self._cancel_job)
         self.store.add_effect(self._show_first_pose)
+        self.store.add_effect(self._player.notice)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 
@@ -138,6 +143,7 @@ class App:
         self._go_to_first_pose(self.store.state)
         self.store.start()
         self.live.start()
+        self._player.start()
         threading.Thread(target=self._warm_up, name="gazeloc-warm-up", daemon=True).start()
         colors = pipeline.stage_named("colors", of_scan=True)
         if colors.is_needed(self.project) and not colors.artifact(self.project, "").exists:
@@ -146,6 +152,7 @@ class App:
     def stop(self) -> None:
         """End the loop, the worker processes and the server, and let others write to the project."""
         self.live.stop()
+        self._player.stop()
         self.store.stop()
         self.jobs.stop()
         self._render.close()
@@ -191,10 +198,21 @@ class App:
         side = gui.add_panel()
         with side.add_tab("Frame"):
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
+        with side.add_tab("Problems"):
+            problem_panel = ProblemPanel(gui, self.data, dispatch)
         side.dock_left()
         side.set_width(430)
         work = (project_panel, keypoint_panel, keypoint_files, suggestion_panel, alignment_panel)
-        looks = (method_panel, figure_panel, view_list, layer_panel, camera_colors, export_panel, frame_panel)
+        looks = (
+            method_panel,
+            figure_panel,
+            view_list,
+            layer_panel,
+            camera_colors,
+            export_panel,
+            frame_panel,
+            problem_panel,
+        )
         for panel in (job_bar, job_logs, *work, *looks):
             self.store.add_view(panel.render)
 
@@ -205,7 +223,8 @@ class App:
         routes = Routes()
         add_static_route(routes)
         pictures = Pictures(self.data, self._render, lambda: self.store.state)
-        add_picture_routes(routes, pictures.frame, pictures.render)
+        add_picture_routes(routes, pictures.frame, pictures.render, pictures.thumbnail)
+        add_show_route(routes, self.data, lambda: self.store.state, self.store.dispatch)
         return routes
 
     def _warm_up(self) -> None:

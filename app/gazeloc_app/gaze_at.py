@@ -30,6 +30,11 @@ def gaze_ray_in_camera(data: ProjectData, recording: str, frame: int) -> Floats 
     return ray if np.isfinite(ray).all() else None
 
 
+def gaze_as_recorded(data: ProjectData, recording: str, frame: int) -> tuple[float, float] | None:
+    """The gaze in the frame as recorded, as `gaze_in_frame`."""
+    return gaze_in_frame(data, recording, frame, data.recording(recording).camera)
+
+
 def gaze_in_frame(data: ProjectData, recording: str, frame: int, camera: Camera | None) -> tuple[float, float] | None:
     """The gaze in the undistorted picture as shares of its width and height; None where it is not in the picture."""
     ray = gaze_ray_in_camera(data, recording, frame)

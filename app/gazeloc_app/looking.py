@@ -52,9 +52,9 @@ class Looking:
     def look(self, frame: int) -> None:
         """Put this browser's camera where the frame's camera was, with the frame's picture before it."""
         state = self._state()
-        pose, camera = frame_pose(self._data, state, frame), self._data.camera(state.recording)
+        pose, camera = self._any_pose(state, frame), self._data.camera(state.recording)
         if pose is None or camera is None:
-            text = f"Frame {frame} is not in the reconstruction, so there is nothing to look through; try a keyframe."
+            text = f"Frame {frame} has no pose, so there is nothing to look through; try another one."
             self._dispatch(Notify(Level.WARNING, text))
             return
         job = Frame(recording=state.recording, index=frame)
@@ -74,8 +74,20 @@ class Looking:
     def follow(self, state: AppState) -> None:
         """Go on to the frame of the slider while looking through a camera of the recording."""
         at = self.target
-        if at is not None and at.side is Side.SFM and at != Target(state.recording, state.frame):
+        is_elsewhere = at is not None and at.side is Side.SFM and at != Target(state.recording, state.frame)
+        if is_elsewhere and self._any_pose(state, state.frame) is not None:  # frames without a pose are passed over
             self.look(state.frame)
+
+    def _any_pose(self, state: AppState, frame: int) -> RigidTransform | None:
+        """A frame's camera by the poses that are shown, or else where the reconstruction has it (`scan_from_camera`).
+
+        Frames of the reconstruction are looked at where it has them, so that clicks in them fit to it.
+        """
+        pose = frame_pose(self._data, state, frame)
+        if pose is not None:
+            return pose
+        trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
+        return trajectory.pose(frame) if trajectory is not None and frame < len(trajectory) else None
 
     def pose_and_camera(self, state: AppState) -> tuple[RigidTransform | None, Camera | None]:
         """Where the camera that is looked through stands (`scan_from_camera`), and the camera; None where unknown."""

@@ -8,16 +8,18 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from gazeloc_app.data import ProjectData, method_of
+from gazeloc_app.data import ProjectData
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.render_worker import Frame, Render, camera_text
 from gazeloc_app.state import AppState
+from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.methods import Method
 from gazeloc_core.transforms import wxyz_of
 
 WIDTH_PX = 900
 """Wide enough for the panel: more is not seen there and takes longer to scrub."""
+THUMBNAIL_PX = 144
 _KEY = re.compile(rf"[0-9a-f]{{1,64}}|({'|'.join(Method)})@[0-9a-f-]{{1,64}}")
 
 
@@ -34,24 +36,38 @@ class Pictures:
         self._asked: dict[Frame | Render, Future[Any]] = {}
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
-        """A frame, undistorted, as JPEG; with `tags=1` the tags in it are drawn."""
-        job = Frame(recording=recording, index=index, width=WIDTH_PX, with_tags=query.get("tags") == "1")
+        """A frame as JPEG, undistorted; with `tags=1` the tags in it are drawn, with `lens=1` it is as recorded."""
+        lens = query.get("lens") == "1"
+        tags = query.get("tags") == "1" and not lens
+        job = Frame(recording=recording, index=index, width=WIDTH_PX, with_tags=tags, as_recorded=lens)
         return await self._picture("frame", recording, index, job)
 
+    async def thumbnail(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
+        """A frame as a small JPEG for lists; every one that is asked for is made, after what people look at."""
+        del query
+        job = Frame(recording=recording, index=index, width=THUMBNAIL_PX, as_recorded=True)
+        return bytes(await self._process.request(job))
+
     async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
-        """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG."""
+        """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG.
+
+        With `lens=1` through the lens as it is, distortion and all.
+        """
         self._data.project.recording(recording)
         if not _KEY.fullmatch(query.get("rev", "")):
             raise InputError("A render is of poses, which `rev` names.")
-        trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._data.camera(recording)
+        trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._camera(recording, query)
         pose = trajectory.pose(index) if trajectory is not None and index < len(trajectory) else None
         if pose is None or camera is None:
             raise InputError(f"Frame {index} has no pose, so there is no render of it.")
         w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
         cx, cy, cz = (float(value) for value in pose.translation)
         job = Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=WIDTH_PX)
-        kind = f"render {method_of(query.get('rev'))}"  # methods side by side do not push each other aside
+        kind = f"render {query.get('rev')}"  # poses side by side do not push each other aside
         return await self._picture(kind, recording, index, job)
+
+    def _camera(self, recording: str, query: Mapping[str, str]) -> Camera | None:
+        return self._data.recording(recording).camera if query.get("lens") == "1" else self._data.camera(recording)
 
     async def _picture(self, kind: str, recording: str, index: int, job: Frame | Render) -> bytes:
         state = self._state()

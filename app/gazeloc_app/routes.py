@@ -101,10 +101,11 @@ def add_picture_routes(
     routes: Routes,
     frame: Callable[[str, int, Mapping[str, str]], Awaitable[bytes]],
     render: Callable[[str, int, Mapping[str, str]], Awaitable[bytes]],
+    thumbnail: Callable[[str, int, Mapping[str, str]], Awaitable[bytes]],
 ) -> None:
-    """`/frames/<recording>/<index>.jpg` and `/renders/<recording>/<index>.jpg`, JPEG bytes from the app's callables.
+    """`/frames/<recording>/<index>.jpg` `/renders/…` and `/thumbnails/…` likewise: JPEG bytes from the app's callables.
 
-    Both take the recording's name, the frame's index and the query. A URL with `?rev=` may be kept by the browser:
+    All take the recording's name, the frame's index and the query. A URL with `?rev=` may be kept by the browser:
     the page changes `rev` whenever the picture may have changed.
     """
 
@@ -119,4 +120,5 @@ def add_picture_routes(
         return answer
 
     routes.get("/frames/{recording}/{index}.jpg", handler_of(frame))
+    routes.get("/thumbnails/{recording}/{index}.jpg", handler_of(thumbnail))
     routes.get("/renders/{recording}/{index}.jpg", handler_of(render))

@@ -160,6 +160,11 @@ class AppState:
     """Whether the next best place for a keypoint is shown."""
     views: tuple[SavedView, ...] = ()
     """Places to look at the room from that people saved; shared by all recordings."""
+    is_playing: bool = False
+    speed: float = 1.0
+    """How many seconds of the recording pass in a second of playing."""
+    compared_with: str = ""
+    """Whose render shows beside that of the poses that are shown: an alignment's key, a method, or "" for none."""
     draws_tags: bool = False
     """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None

@@ -32,7 +32,7 @@ def pictures():
             raise ZeroDivisionError
         return b"render"
 
-    add_picture_routes(routes, frame, render)
+    add_picture_routes(routes, frame, render, frame)
     return routes
 
 

@@ -19,6 +19,18 @@ class ShowFrame:
 
 
 @dataclass(frozen=True)
+class CompareWith:
+    """The render from other poses shall show beside that of the poses that are shown."""
+
+    poses: str
+    """An alignment's key, a method, or "" for none."""
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return replace(state, compared_with=self.poses)
+
+
+@dataclass(frozen=True)
 class DrawTags:
     """The tags that were found shall be drawn into the frame, or not."""
 

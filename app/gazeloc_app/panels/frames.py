@@ -1,32 +1,29 @@
-"""Panel: one frame of the recording against the render of the scan from its estimated pose, with blend and wipe.
+"""Panel: one frame of the recording against the render of the scan from its estimated pose, and the way through all.
 
-The pictures are URLs of our own routes (routes.py); blend and wipe are CSS in the page and cost the server nothing.
+How frame and render lie on each other is the page's own (comparison.py); everything else is the same in all browsers.
 """
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Callable
 from pathlib import Path
-from urllib.parse import quote
 
 import numpy as np
 from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
-from gazeloc_app.actions.picks import Side
-from gazeloc_app.actions.views import DrawTags, ShowFrame
+from gazeloc_app.actions.views import CompareWith, DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
-from gazeloc_app.frame_marks import marks_in_frame
-from gazeloc_app.gaze_at import gaze_in_frame
-from gazeloc_app.panels.marks_svg import marks_svg
-from gazeloc_app.sightings import image_of_frame
+from gazeloc_app.panels.comparison import ComparisonHtml
+from gazeloc_app.panels.marks import MarkWidgets
+from gazeloc_app.panels.playing import PlayWidgets
 from gazeloc_app.state import AppState, Layer
-from gazeloc_core.camera import Camera
-from gazeloc_core.trajectory import PoseStatus, Trajectory
+from gazeloc_app.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
+from gazeloc_core.methods import Method
+from gazeloc_core.trajectory import PoseStatus
 
-STRIP_PARTS = 300
+NOTHING = "nothing"
 STATUS_TEXT = {
     PoseStatus.REGISTERED.value: "registered",
     PoseStatus.INTERPOLATED.value: "interpolated between registered frames",
@@ -37,7 +34,7 @@ STATUS_TEXT = {
 
 
 class FramePanel:
-    """The slider, the comparison, and what is known about the frame."""
+    """The comparison, the timeline, marks, and what is known about the frame."""
 
     def __init__(
         self,
@@ -48,90 +45,78 @@ class FramePanel:
         look_through: Callable[[int, int], None],
     ):
         """`look_through(client_id, frame)` puts one browser's camera where the frame's camera was."""
-        self._gui = gui
-        self._template = template.read_text(encoding="utf-8")
-        self._data = data
-        self._dispatch = dispatch
-        self._look_through = look_through
+        self._data, self._dispatch, self._look_through = data, dispatch, look_through
         self._state: AppState | None = None
         self._seen: object = None
-        self._revision = secrets.token_hex(4)  # the frames of this session; the browser may keep them
-        self._before = ""
-        self._strip_of: Trajectory | None = None
-        self._comparison = gui.add_html("")
+        self._seen_timeline: object = None
+        self._others: dict[str, str] = {NOTHING: ""}
+        self._comparison = ComparisonHtml(gui, template, data)
         self._slider = gui.add_slider("Frame", 0, 1, 1, 0)
-        self._strip = gui.add_html("")
-        self._steps = gui.add_button_group("", ("◀", "▶", "◀ keyframe", "keyframe ▶"))
+        self._timeline = gui.add_html("")
+        self._facts = gui.add_html("")
+        self._marks = MarkWidgets(gui, dispatch)
+        self._playing = PlayWidgets(gui, data, dispatch)
         self._look = gui.add_button(
             "Look through this camera",
-            hint="Of frames in the reconstruction, keyframes that is. Clicks in the frame can then make keypoints.",
+            hint="In this browser. It follows the frame, also while it plays. In frames of the reconstruction, "
+            "keyframes that is, clicks can then make keypoints.",
         )
         self._tags = gui.add_checkbox(
             "Draw tags", False, hint="Outline, id, axes and a cube of each tag that was found in the frame."
         )
-        self._facts = gui.add_html("")
-        widgets.on_user(self._tags, lambda event: self._dispatch(DrawTags(bool(event.target.value))))
+        self._other = gui.add_dropdown(
+            "B, for A | B", (NOTHING,), hint="The render from another method's poses or another alignment, below A's."
+        )
+        widgets.on_user(self._tags, lambda event: dispatch(DrawTags(bool(event.target.value))))
         widgets.on_user(self._slider, lambda event: self._show(int(event.target.value)))
-        widgets.on_user(self._steps, lambda event: self._step(str(event.target.value)), event="on_click")
-        widgets.on_user(self._look, lambda event: self._look_through(event.client_id, self._frame()), event="on_click")
+        widgets.on_user(self._look, lambda event: look_through(event.client_id, self._frame()), event="on_click")
+        widgets.on_user(self._other, lambda event: self._compare_with(str(event.target.value)))
 
     def render(self, state: AppState) -> None:
         """Show the state's frame."""
         self._state = state
+        self._marks.render(state)
+        self._playing.render(state)
         key = self._data.poses_key(state.recording, state.annotation)
         keypoints = (state.annotation.keypoints, state.selected_key, state.layers.is_visible(Layer.KEYPOINTS))
-        shown = (state.recording, state.frame, key, state.data_revision, state.renderer_note, state.draws_tags)
-        seen = (shown, keypoints)
+        found = (state.recording, key, state.data_revision, state.annotation.marks, state.compared_with)
+        if found != self._seen_timeline:
+            self._seen_timeline = found
+            self._render_timeline(state, key)
+            self._render_others(state)
+        seen = (found, keypoints, state.frame, state.renderer_note, state.draws_tags)
         if seen == self._seen:
             return
         self._seen = seen
-        recording = self._data.recording(state.recording)
-        last = len(recording) - 1
+        last = len(self._data.recording(state.recording)) - 1
         widgets.set_property(self._slider, "max", max(last, 1))
         frame = min(state.frame, last)
         widgets.set_value(self._slider, frame)
         trajectory = self._data.trajectory(state.recording, key)
         has_pose = trajectory is not None and trajectory.pose(frame) is not None
         widgets.set_value(self._tags, state.draws_tags)
-        widgets.set_property(self._look, "disabled", image_of_frame(self._data, state.recording, frame) is None)
-        widgets.set_content(self._comparison, self._comparison_html(state, frame, has_pose))
-        if trajectory is not self._strip_of:
-            self._strip_of = trajectory
-            widgets.set_content(self._strip, "" if trajectory is None else _strip(trajectory))
+        widgets.set_property(self._look, "disabled", not has_pose)
+        self._comparison.show(state, frame, self._other_poses(state))
         status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
-        seconds = (int(recording.timestamp_ns[frame]) - int(recording.timestamp_ns[0])) / 1e9
-        facts = [f"Frame {frame} of {len(recording)} · {seconds:.2f} s · {STATUS_TEXT[status]}"]
-        support = self._data.tag_support(state.recording, state.annotation.method, frame)
-        facts += [support, self._error_text(state, frame), state.renderer_note]
-        widgets.set_content(self._facts, widgets.box("<br>".join(widgets.text(fact) for fact in facts if fact)))
+        widgets.set_content(self._facts, widgets.box(self._facts_html(state, frame, status)))
 
-    def _comparison_html(self, state: AppState, frame: int, has_pose: bool) -> str:
-        name, revision = state.recording, self._data.poses_key(state.recording, state.annotation) or "none"
-        camera = self._data.camera(name)
-        gaze = gaze_in_frame(self._data, name, frame, camera)
-        url = f"/frames/{quote(name)}/{frame}.jpg?rev={self._revision}"
-        if state.draws_tags:
-            url += f"{state.data_revision}&tags=1"
-        values = {
-            "FRAME_URL": url,
-            "BEFORE_URL": self._before,
-            "RENDER_URL": f"/renders/{quote(name)}/{frame}.jpg?rev={quote(revision)}" if has_pose else "",
-            "ASPECT": f"{camera.width}/{camera.height}" if camera else "1/1",
-            "GAZE_X": f"{100 * gaze[0]:.3f}" if gaze else "-50",
-            "GAZE_Y": f"{100 * gaze[1]:.3f}" if gaze else "-50",
-            "RENDER_DISPLAY": "block" if has_pose else "none",
-            "NONE_DISPLAY": "none" if has_pose else "flex",
-        }
-        self._before = url
-        content = self._template
-        for key, value in values.items():
-            content = content.replace(f"@{key}@", widgets.text(value))
-        return content.replace("@KEYPOINTS@", self._keypoints_svg(state, frame, camera))
+    def _facts_html(self, state: AppState, frame: int, status: str) -> str:
+        times = self._data.recording(state.recording).timestamp_ns
+        seconds = (int(times[frame]) - int(times[0])) / 1e9
+        facts = [f"Frame {frame} of {len(times)} · {seconds:.2f} s · {STATUS_TEXT[status]}"]
+        facts.append(self._data.tag_support(state.recording, state.annotation.method, frame))
+        facts += [self._score_text(state, frame), self._error_text(state, frame), state.renderer_note]
+        lines = [widgets.text(fact) for fact in facts if fact]
+        mark = state.annotation.marks.get(frame)
+        if mark is not None:
+            lines.append(widgets.colored(f"{MARK_SIGNS[mark.mark]} marked {mark.mark}", MARK_COLORS[mark.mark]))
+        return "<br>".join(lines)
 
-    def _keypoints_svg(self, state: AppState, frame: int, camera: Camera | None) -> str:
-        if camera is None or not state.layers.is_visible(Layer.KEYPOINTS):
+    def _score_text(self, state: AppState, frame: int) -> str:
+        found = self._data.frame_scores(state.recording, self._data.poses_key(state.recording, state.annotation))
+        if found is None or not np.isfinite(found.score[frame]):
             return ""
-        return marks_svg(*marks_in_frame(self._data, state, Side.SFM, frame), camera, state.selected_key)
+        return f"Agreement with the scan: {found.score[frame]:.2f}; it looks {found.offset_deg[frame]:.2f}° off."
 
     def _error_text(self, state: AppState, frame: int) -> str:
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
@@ -139,37 +124,47 @@ class FramePanel:
             return ""
         return f"Against the ground truth: {100 * errors.position_m[frame]:.1f} cm, {errors.rotation_deg[frame]:.2f}°"
 
+    def _render_timeline(self, state: AppState, key: str | None) -> None:
+        errors = self._data.errors(state.recording, key)
+        content = timeline_html(
+            state.recording,
+            self._data.trajectory(state.recording, key),
+            self._data.scores(state.recording, key),
+            None if errors is None else errors.position_m,
+            state.annotation.marks,
+        )
+        widgets.set_content(self._timeline, content)
+
+    def _render_others(self, state: AppState) -> None:
+        alignments = {f"sfm, {one.method} {one.key}": one.key for one in self._data.alignments(state.recording)}
+        methods = {
+            method.value: method.value
+            for method in Method
+            if method is not Method.SFM and self._data.poses_key(state.recording, state.annotation, method)
+        }
+        self._others = {NOTHING: ""} | methods | alignments
+        if tuple(self._other.options) != tuple(self._others):
+            self._other.options = tuple(self._others)
+        label = next((name for name, poses in self._others.items() if poses == state.compared_with), NOTHING)
+        widgets.set_value(self._other, label)
+
+    def _other_poses(self, state: AppState) -> tuple[str, str | None] | None:
+        """What B is, for people, and its key; None for nothing, or where it is gone."""
+        poses = state.compared_with
+        if not poses or poses not in self._others.values():
+            return None
+        if poses in tuple(Method):
+            return poses, self._data.poses_key(state.recording, state.annotation, Method(poses))
+        return f"sfm {poses}", poses
+
+    def _compare_with(self, label: str) -> None:
+        if label in self._others:
+            self._dispatch(CompareWith(self._others[label]))
+
     def _frame(self) -> int:
         return 0 if self._state is None else self._state.frame
-
-    def _step(self, which: str) -> None:
-        if self._state is None:
-            return
-        frame = self._frame()
-        keyframes = self._data.keyframes(self._state.recording)
-        if "keyframe" in which and keyframes is not None and len(keyframes):
-            later, earlier = keyframes[keyframes > frame], keyframes[keyframes < frame]
-            target = (later[0] if len(later) else frame) if "▶" in which else (earlier[-1] if len(earlier) else frame)
-        else:
-            target = frame + (1 if "▶" in which else -1)
-        self._show(int(target))
 
     def _show(self, frame: int) -> None:
         if self._state is not None:
             last = len(self._data.recording(self._state.recording)) - 1
             self._dispatch(ShowFrame(min(max(frame, 0), last)))
-
-
-def _strip(trajectory: Trajectory) -> str:
-    """A strip below the slider: green where frames have a pose, red where they have none."""
-    bins = np.array_split(trajectory.has_pose, min(len(trajectory), STRIP_PARTS))
-    share = np.array([part.mean() for part in bins])
-    colors = np.where(share > 0.99, "#40c057", np.where(share < 0.5, "#ff8787", "#ffd43b"))
-    edges = np.flatnonzero(colors[1:] != colors[:-1]) + 1
-    starts, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(colors)]])
-    stops = ",".join(
-        f"{colors[a]} {100 * a / len(colors):.1f}% {100 * b / len(colors):.1f}%"
-        for a, b in zip(starts.tolist(), ends.tolist(), strict=True)
-    )
-    style = f"height:6px;margin:2px 74px 10px 112px;border-radius:3px;background:linear-gradient(90deg,{stops})"
-    return f'<div style="{style}" title="green: with a pose, yellow: some, red: none"></div>'

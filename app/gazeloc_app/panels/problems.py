@@ -1,0 +1,117 @@
+"""Panel: the frames worst first, or those that people marked, with small pictures; a click goes to a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from urllib.parse import quote
+
+import numpy as np
+from viser import GuiApi
+
+from gazeloc_app import tasks, widgets
+from gazeloc_app.actions.action import Action
+from gazeloc_app.actions.jobs import StartJob
+from gazeloc_app.data import FrameErrors, ProjectData
+from gazeloc_app.panels.playing import table_of
+from gazeloc_app.problems import FrameTable, Problem, worst_first
+from gazeloc_app.state import AppState
+from gazeloc_app.timeline_html import MARK_COLORS, MARK_SIGNS
+from gazeloc_core.marks import FrameMarks, Mark
+
+_MOST = 40
+_FIRST = "Nothing is scored yet: “Score the frames” compares each with the scan seen from its pose."
+
+
+class Which(StrEnum):
+    """Which frames the list has."""
+
+    WORST = "lowest score first"
+    BAD = "marked bad"
+    UNSURE = "marked unsure"
+    GOOD = "marked good"
+    NO_POSE = "without a pose"
+
+
+class ProblemPanel:
+    """The button that scores, how many frames have which problem, and the list."""
+
+    def __init__(self, gui: GuiApi, data: ProjectData, dispatch: Callable[[Action], None]):
+        self._data, self._dispatch = data, dispatch
+        self._state: AppState | None = None
+        self._seen: object = None
+        self._score = gui.add_button(
+            "Score the frames",
+            hint="How well each frame agrees with the scan seen from its pose; goes on where it was.",
+        )
+        self._summary = gui.add_html("")
+        self._which = gui.add_dropdown("Frames", tuple(Which), initial_value=Which.WORST)
+        self._list = gui.add_html("")
+        widgets.on_user(self._score, lambda _: self._start(), event="on_click")
+        widgets.on_user(self._which, lambda _: self._render_list())
+
+    def render(self, state: AppState) -> None:
+        """Show the state's frames."""
+        self._state = state
+        widgets.set_property(self._score, "disabled", state.job is not None)
+        key = self._data.poses_key(state.recording, state.annotation)
+        seen = (state.recording, key, state.data_revision, state.annotation.marks)
+        if seen != self._seen:
+            self._seen = seen
+            self._render_list()
+
+    def _render_list(self) -> None:
+        state = self._state
+        if state is None:
+            return
+        table = table_of(self._data, state)
+        errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
+        widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks)))
+        frames = self._frames(table, state.annotation.marks)
+        rows = "".join(_row(state, table, errors, frame) for frame in frames[:_MOST])
+        if len(frames) > _MOST:
+            rows += f"<div>and {len(frames) - _MOST} more</div>"
+        widgets.set_content(self._list, widgets.box(f'<div class="gazeloc-frames">{rows}</div>' if rows else "None."))
+
+    def _frames(self, table: FrameTable, marks: FrameMarks) -> list[int]:
+        which = str(self._which.value)
+        if which == Which.NO_POSE:
+            return [int(frame) for frame in np.flatnonzero(~table.has_pose)]
+        by_mark = {Which.BAD: Mark.BAD, Which.UNSURE: Mark.UNSURE, Which.GOOD: Mark.GOOD}
+        if which in tuple(by_mark):
+            wanted = by_mark[Which(which)]
+            return [one.frame_index for one in marks.marks if one.mark is wanted and one.frame_index < len(table.score)]
+        return worst_first(table)
+
+    def _start(self) -> None:
+        if self._state is not None:
+            keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
+            self._dispatch(StartJob("Score the frames", tasks.score_frames, keywords))
+
+
+def _summary_html(table: FrameTable, marks: FrameMarks) -> str:
+    known = table.score[np.isfinite(table.score)]
+    scored = f"{len(known)} frames are scored, the median is {np.median(known):.2f}." if len(known) else _FIRST
+    counts = [f"{int((table.problem == kind.value).sum())} {kind.value}" for kind in Problem if kind.value]
+    marked = [f"{count} {mark.value}" for mark, count in marks.counts().items()]
+    return f"{widgets.text(scored)}<br>Problems: {', '.join(counts)}.<br>Marks: {', '.join(marked)}."
+
+
+def _row(state: AppState, table: FrameTable, errors: FrameErrors | None, frame: int) -> str:
+    facts = [f"<b>Frame {frame}</b>"]
+    if np.isfinite(table.score[frame]):
+        facts.append(f"agreement {table.score[frame]:.2f}")
+    if errors is not None and np.isfinite(errors.position_m[frame]):
+        facts.append(f"error {100 * errors.position_m[frame]:.1f} cm, {errors.rotation_deg[frame]:.2f}°")
+    if not table.has_pose[frame]:
+        facts.append("no pose")
+    found = state.annotation.marks.get(frame)
+    if found is not None:
+        facts.append(widgets.colored(f"{MARK_SIGNS[found.mark]} {found.mark}", MARK_COLORS[found.mark]))
+        facts.append(widgets.text(found.note))
+    url = widgets.text(f"/show/{quote(state.recording)}/{frame}")
+    picture = widgets.text(f"/thumbnails/{quote(state.recording)}/{frame}.jpg?rev=1")
+    return (
+        f'<a data-url="{url}" onclick="gazelocTimeline.show(this.dataset.url)">'
+        f'<img alt="" loading="lazy" src="{picture}"><span>{" · ".join(fact for fact in facts if fact)}</span></a>'
+    )

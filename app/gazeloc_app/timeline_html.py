@@ -1,0 +1,106 @@
+"""The timeline as HTML: a strip of how the frames came by their poses, marks, score and error; a click goes there.
+
+The page's half (static/page/timeline.js and .css) turns a click into the frame and keeps the cursor.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazeloc_app import widgets
+from gazeloc_app.problems import LOW_SCORE
+from gazeloc_core.arrays import Floats
+from gazeloc_core.marks import FrameMarks, Mark
+from gazeloc_core.trajectory import PoseStatus, Trajectory
+
+PARTS = 400
+"""A longer recording is drawn in this many parts, each with its worst frame."""
+_WORST_FIRST = ("rejected", "none", "tag_only", "interpolated", "registered")
+STATUS_COLORS = {  # by Okabe and Ito, told apart by eyes that see red and green alike
+    PoseStatus.REGISTERED.value: "#009e73",
+    PoseStatus.INTERPOLATED.value: "#56b4e9",
+    PoseStatus.TAG_ONLY.value: "#e69f00",
+    PoseStatus.REJECTED.value: "#d55e00",
+    PoseStatus.NONE.value: "#adb5bd",
+}
+STATUS_NAMES = {
+    PoseStatus.REGISTERED.value: "registered",
+    PoseStatus.INTERPOLATED.value: "interpolated",
+    PoseStatus.TAG_ONLY.value: "tag only",
+    PoseStatus.REJECTED.value: "rejected",
+    PoseStatus.NONE.value: "none",
+}
+MARK_COLORS = {Mark.GOOD: "#009e73", Mark.BAD: "#d55e00", Mark.UNSURE: "#e6b800"}
+MARK_SIGNS = {Mark.GOOD: "✓", Mark.BAD: "✗", Mark.UNSURE: "?"}
+
+
+def timeline_html(
+    recording: str, trajectory: Trajectory | None, score: Floats, error_m: Floats | None, marks: FrameMarks
+) -> str:
+    """The whole timeline of a recording of N frames; `score` (N,) and `error_m` (N,) are NaN where there is none."""
+    count = len(score)
+    status = np.full(count, PoseStatus.NONE.value) if trajectory is None else trajectory.status
+    rows = [_strip(status), _mark_ticks(marks, count)]
+    legend = [
+        f'<i style="background:{STATUS_COLORS[name]}"></i>{STATUS_NAMES[name]} {int((status == name).sum())}'
+        for name in STATUS_NAMES
+        if (status == name).any()
+    ]
+    if np.isfinite(score).any():
+        rows.append(_curve(score, 1.0, "#1c6e8c", limit=LOW_SCORE))
+        legend.append(f'<i style="background:#1c6e8c"></i>agreement 0–1, dashed {LOW_SCORE:g}')
+    if error_m is not None and np.isfinite(error_m).any():
+        top = max(float(np.nanpercentile(error_m, 98)), 1e-6)
+        rows.append(_curve(-error_m, 0.0, "#9c36b5", low=-top))
+        legend.append(f'<i style="background:#9c36b5"></i>error, down to {100 * top:.1f} cm')
+    url = widgets.text(f"/show/{quote(recording)}/")
+    return (
+        f'<div class="gazeloc-timeline" data-show="{url}" data-last="{count - 1}"'
+        ' onpointerdown="gazelocTimeline.go(event)" onpointermove="gazelocTimeline.drag(event)"'
+        f' title="Click to go to a frame">{"".join(rows)}<b></b></div>'
+        f'<div class="gazeloc-legend">{" ".join(f"<span>{item}</span>" for item in legend)}</div>'
+    )
+
+
+def _strip(status: NDArray[np.str_]) -> str:
+    """A bar in runs of one colour; a part of several frames has the colour of its worst."""
+    rank = np.array([_WORST_FIRST.index(str(name)) for name in status])
+    worst = np.array([part.min() for part in np.array_split(rank, min(len(rank), PARTS))])
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(worst)) + 1, [len(worst)]])
+    stops = ",".join(
+        f"{STATUS_COLORS[_WORST_FIRST[worst[a]]]} {100 * a / len(worst):.2f}% {100 * b / len(worst):.2f}%"
+        for a, b in pairwise(edges.tolist())
+    )
+    return f'<div style="height:10px;background:linear-gradient(90deg,{stops})"></div>'
+
+
+def _mark_ticks(marks: FrameMarks, count: int) -> str:
+    ticks = "".join(
+        f'<u style="left:{100 * one.frame_index / max(count - 1, 1):.2f}%;background:{MARK_COLORS[one.mark]}"></u>'
+        for one in marks.marks
+        if one.frame_index < count
+    )
+    return f'<div style="height:8px">{ticks}</div>'
+
+
+def _curve(values: Floats, high: float, color: str, *, low: float = 0.0, limit: float | None = None) -> str:
+    """The lowest value of each part as a line from `low` to `high`, broken where nothing is known."""
+    parts = np.array_split(values, min(len(values), PARTS))
+    lowest = np.array([np.nanmin(part) if np.isfinite(part).any() else np.nan for part in parts])
+    y = 29 - 28 * np.clip((lowest - low) / max(high - low, 1e-12), 0, 1)
+    pieces, pen_is_down = [], False
+    for x, at in enumerate(y):
+        if np.isfinite(at):
+            pieces.append(f"{'L' if pen_is_down else 'M'}{x + 0.5:g} {at:.1f}h.01")
+        pen_is_down = bool(np.isfinite(at))
+    dashed = (
+        "" if limit is None else f'<path d="M0 {29 - 28 * limit:.1f}H{len(y)}" stroke="#888" stroke-dasharray="4"/>'
+    )
+    return (
+        f'<svg viewBox="0 0 {len(y)} 30" preserveAspectRatio="none">{dashed}'
+        f'<path d="{"".join(pieces)}" stroke="{color}" fill="none"/></svg>'
+    )
