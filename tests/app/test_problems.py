@@ -13,6 +13,7 @@ from gazeloc_app.actions.marks import MarkFrame
 from gazeloc_app.actions.playing import Play, PlayOn, SetSpeed, TogglePlay
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.app import App
+from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.problems import frame_table, next_problem, worst_first
 from gazeloc_app.timeline_html import PARTS, timeline_html
 
@@ -135,8 +136,8 @@ def test_a_click_that_cannot_be_is_refused(app, url):
 
 def test_the_panel_shows_marks_and_their_note(app):
     step(app, ShowFrame(3), MarkFrame(Mark.BAD))
-    handles = app.server.gui._gui_input_handle_from_uuid.values()
-    assert any("marked bad" in str(getattr(handle, "content", "")) for handle in handles)
+    (panel,) = (view.__self__ for view in app.store._views if isinstance(view.__self__, FramePanel))
+    assert "marked bad" in panel._facts.content
 
 
 def test_a_picture_through_the_original_lens_has_the_recordings_own_shape(app):

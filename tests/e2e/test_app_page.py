@@ -242,13 +242,15 @@ def test_the_slider_changes_frame_and_render_and_blend_and_wipe_are_the_pages_ow
         ("Wipe", "--gazeloc-wipe", "20", "20%"),
         ("Blend", "--gazeloc-blend", "40", "0.4"),
     ):
-        page.page.get_by_label(label).fill(value)
+        page.page.get_by_role("radio", name=label, exact=True).click()
+        page.page.get_by_label(label).and_(page.page.locator("input")).fill(value)
         read = f"getComputedStyle(document.documentElement).getPropertyValue('{variable}')"
         assert page.page.evaluate(read).strip() == shown
     page.field("Frame").fill("8")
     page.field("Frame").press("Enter")
     page.until(lambda: "/8.jpg" in (frame.get_attribute("src") or ""))
-    assert page.page.get_by_label("Wipe").input_value() == "20"
+    page.page.get_by_role("radio", name="Wipe", exact=True).click()
+    assert page.page.get_by_label("Wipe").and_(page.page.locator("input")).input_value() == "20"
     difference = page.page.evaluate(_DIFFERENCE)
     assert difference < 12  # the render from the estimated pose shows what the frame shows
     page.viewer.save("app-compared")

@@ -18,6 +18,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
 from gazeloc_app.panels.playing import PlayWidgets
+from gazeloc_app.sightings import image_of_frame
 from gazeloc_app.state import AppState, Layer
 from gazeloc_app.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
 from gazeloc_core.methods import Method
@@ -95,7 +96,8 @@ class FramePanel:
         trajectory = self._data.trajectory(state.recording, key)
         has_pose = trajectory is not None and trajectory.pose(frame) is not None
         widgets.set_value(self._tags, state.draws_tags)
-        widgets.set_property(self._look, "disabled", not has_pose)
+        is_anywhere = has_pose or image_of_frame(self._data, state.recording, frame) is not None
+        widgets.set_property(self._look, "disabled", not is_anywhere)
         self._comparison.show(state, frame, self._other_poses(state))
         status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
         widgets.set_content(self._facts, widgets.box(self._facts_html(state, frame, status)))
