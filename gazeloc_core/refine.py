@@ -25,13 +25,13 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit  # not scipy.stats, which takes a second to import
 
 from gazeloc_core.alignment import Alignment, AlignmentMethod, AlignOptions, consensus, judge
 from gazeloc_core.arrays import Bools, Floats
 from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.icp import IcpOptions, Overlap, Target, choose_points, overlap, run_icp
 from gazeloc_core.progress import Report, part, silent
+from gazeloc_core.proof import gains_of_groups, least_mean_gain, rms
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.similarity_fit import fit_similarity, is_degenerate, residuals, similarity_jacobian
@@ -180,8 +180,8 @@ def refine(
                 refined,
                 accepted,
                 reason,
-                _rms(before),
-                _rms(after),
+                rms(before),
+                rms(after),
                 agreement_before,
                 agreement_after,
                 overlap(start.scan_from_sfm.apply(points), target, within),
@@ -206,10 +206,10 @@ def decide(
         compared = f"({agreement_before:.3f} before, {agreement_after:.3f} after)"
         if pictures < -options.min_agreement_gain:
             return False, f"Refused: the pictures agree less {compared}."
-    gains = _gains_of_groups(pairs, before_m, after_m)
-    before, after = _rms(before_m), _rms(after_m)
+    gains = gains_of_groups(pairs, before_m, after_m)
+    before, after = rms(before_m), rms(after_m)
     if len(gains) >= 3 and before is not None and after is not None:
-        needed = _least_mean_gain(gains, options.significance)
+        needed = least_mean_gain(gains, options.significance)
         numbers = f"keypoints that ICP did not use are off by {after * 100:.1f} cm, by {before * 100:.1f} cm before"
         if after < before and gains.mean() > needed:
             return True, f"Accepted: {numbers}."
@@ -220,12 +220,6 @@ def decide(
     if pictures > options.min_agreement_gain:
         return True, f"Accepted: the pictures agree better {compared}; {numbers}."
     return False, f"Refused: {numbers}. That is no proof: compare by eye and choose it yourself, or add keypoints."
-
-
-def _least_mean_gain(gains: Floats, significance: float) -> float:
-    """The mean of gains (G,) that chance exceeds with probability `significance`, by Student's t-test."""
-    spread = max(float(gains.std(ddof=1)), 1e-9) / np.sqrt(len(gains))
-    return float(stdtrit(len(gains) - 1, 1 - significance) * spread)
 
 
 def _schedule(start: Alignment, options: RefineOptions) -> tuple[float, ...]:
@@ -271,18 +265,6 @@ def _correction(pairs: Correspondences, held_out: Bools, scan_from_sfm: Similari
     return float((1 + eigenvalues).sum() / (1 / (1 - eigenvalues)).sum())
 
 
-def _gains_of_groups(pairs: Correspondences, before_m: Floats, after_m: Floats) -> Floats:
-    """(G,) logarithm of how many times smaller each comparable group's error became."""
-    gains = []
-    for group in range(len(pairs.group_names)):
-        members = pairs.of_group(group) & np.isfinite(before_m) & np.isfinite(after_m)
-        if members.any():
-            floor = np.mean(pairs.sigma_m[members] ** 2)
-            before, after = (np.mean(errors[members] ** 2) + floor for errors in (before_m, after_m))
-            gains.append(0.5 * np.log(before / after))
-    return np.array(gains)
-
-
 def _preference(candidate: Candidate) -> tuple[bool, float, float]:
     """Sorts the accepted first, then by error at keypoints, then by agreement of pictures."""
     error = candidate.keypoints_after_m
@@ -292,8 +274,3 @@ def _preference(candidate: Candidate) -> tuple[bool, float, float]:
         float("inf") if error is None else error,
         0.0 if agreement is None else -agreement,
     )
-
-
-def _rms(errors: Floats) -> float | None:
-    known = errors[np.isfinite(errors)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else None

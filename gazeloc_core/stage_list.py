@@ -2,7 +2,7 @@
 
 scan       colors ─ tags ─ corners ───────────────────────────┐
 recording  keyframes ─ undistorted ┬ tags ─────────┬ corners ─┴ alignment ─ refinement ─ trajectory ─ gaze
-                                   └ reconstruction ┘          (of each method)
+                                   └ reconstruction ┴ anchoring    (of each method)
 """
 
 from __future__ import annotations
@@ -15,7 +15,19 @@ from gazeloc_core.artifacts import Artifact
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report
 from gazeloc_core.project import Project
-from gazeloc_core.stages import baselines, gaze, inputs, pieces, poses, recording, registration, scan, scores, tags
+from gazeloc_core.stages import (
+    anchoring,
+    baselines,
+    gaze,
+    inputs,
+    pieces,
+    poses,
+    recording,
+    registration,
+    scan,
+    scores,
+    tags,
+)
 
 Run = Callable[[Project, str, Report], object]
 Inputs = Callable[[Project, str], Mapping[str, str]]
@@ -116,6 +128,15 @@ _SHARED: tuple[Stage, ...] = (
         weight=100,
         run=lambda project, name, report: recording.reconstruct_keyframes(project, name, report=report),
         inputs=recording.reconstruction_inputs,
+    ),
+    Stage(
+        name="anchoring",
+        title="Bend the reconstruction to the tags",
+        methods=SFM,
+        weight=10,
+        run=lambda project, name, report: anchoring.anchor_reconstruction(project, name, report=report),
+        inputs=anchoring.anchoring_inputs,
+        is_needed=_has_tags,
     ),
     Stage(
         name="corners",

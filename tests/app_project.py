@@ -23,7 +23,7 @@ from gazeloc_core.raycast import Raycaster
 from gazeloc_core.render import RayRenderer
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.stages import inputs, recording, scan
+from gazeloc_core.stages import anchoring, inputs, recording, scan
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 from gazeloc_core.transforms import Similarity
@@ -170,12 +170,14 @@ def _write_stages(project: Project, name: str, mesh: Mesh, tags: bool) -> None:
         project.artifact(name, "tags").write_arrays(
             inputs.sightings_arrays(_no_sightings()), options={}, inputs=recording.tag_inputs(project, name)
         )
+    models = inputs.model_arrays([_model(mesh, camera, keyframes)])
     project.artifact(name, "reconstruction").write_arrays(
-        inputs.model_arrays([_model(mesh, camera, keyframes)]),
-        options={},
-        inputs=recording.reconstruction_inputs(project, name),
+        models, options={}, inputs=recording.reconstruction_inputs(project, name)
     )
     if tags:
+        project.artifact(name, "anchoring").write_arrays(
+            models, options={}, inputs=anchoring.anchoring_inputs(project, name), notes=("Not bent to the tags.",)
+        )
         on_scan = mark_corners()
         in_sfm = TagCorners(on_scan.tag_id, SFM_FROM_SCAN.apply(on_scan.corners), on_scan.sightings, on_scan.spread)
         project.artifact(name, "corners").write_arrays(

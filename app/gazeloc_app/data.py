@@ -97,8 +97,10 @@ class ProjectData:
 
     def model(self, recording: str) -> SfmModel | None:
         """The reconstruction."""
-        artifact = self.project.artifact(recording, "reconstruction")
-        return self._read(f"{recording} model", artifact, lambda: inputs.load_model(self.project, recording))
+        artifact = inputs.sfm_models(self.project, recording)
+        return self._read(
+            f"{recording} {artifact.stage} model", artifact, lambda: inputs.load_sfm_model(self.project, recording)
+        )
 
     def keyframes(self, recording: str) -> Ints | None:
         """The frames that were to be registered."""
@@ -163,6 +165,12 @@ class ProjectData:
         """The smaller pieces of the reconstruction that have a place in the scan."""
         artifact = self.project.artifact(recording, "pieces")
         return self._read(f"{recording} pieces", artifact, lambda: placed_pieces(self.project, recording)) or []
+
+    def anchoring_reason(self, recording: str) -> str:
+        """Whether the reconstruction was bent to the tags, and why; "" before that was tried."""
+        artifact = self.project.artifact(recording, "anchoring")
+        notes = self._read(f"{recording} anchoring reason", artifact, lambda: artifact.header().notes)
+        return " ".join(notes or ())
 
     def piece_reasons(self, recording: str) -> tuple[str, ...]:
         """Why each smaller piece of the reconstruction has a place in the scan, or none."""

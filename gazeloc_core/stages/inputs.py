@@ -136,17 +136,40 @@ def load_gaze(arrays: dict[str, Any]) -> GazeInScan:
     return GazeInScan(**{name: arrays[name] for name in _GAZE_COLUMNS}, fixation_id=arrays.get("fixation_id"))
 
 
-def load_model(project: Project, recording: str, rank: int = 0) -> SfmModel:
-    """The reconstruction's largest model (`rank` 0) or a smaller one, joined to the recording's frames."""
-    artifact = project.artifact(recording, "reconstruction")
+def sfm_models(project: Project, recording: str) -> Artifact:
+    """Where the models are that the method `sfm` places: bent to the tags if that stage has run, else as they came."""
+    bent = project.artifact(recording, "anchoring")
+    if project.settings.tags is not None and bent.exists:
+        return bent
+    return project.artifact(recording, "reconstruction")
+
+
+def load_sfm_model(project: Project, recording: str, rank: int = 0) -> SfmModel:
+    """The largest model that the method `sfm` places (`rank` 0) or a smaller one, joined to the recording's frames."""
+    artifact = sfm_models(project, recording)
     return _model(artifact, rank, artifact.header().content)
 
 
+def load_sfm_models(project: Project, recording: str) -> list[SfmModel]:
+    """All models that the method `sfm` places, the largest first."""
+    return _models(sfm_models(project, recording))
+
+
+def load_model(project: Project, recording: str) -> SfmModel:
+    """The reconstruction's largest model as it came, joined to the recording's frames."""
+    artifact = project.artifact(recording, "reconstruction")
+    return _model(artifact, 0, artifact.header().content)
+
+
 def load_models(project: Project, recording: str) -> list[SfmModel]:
-    """All models of the reconstruction, the largest first."""
-    columns = project.artifact(recording, "reconstruction").read_arrays()
-    count = sum(name.endswith("_image_names") for name in columns)
-    return [load_model(project, recording, rank) for rank in range(count)]
+    """All models of the reconstruction as they came, the largest first."""
+    return _models(project.artifact(recording, "reconstruction"))
+
+
+def _models(artifact: Artifact) -> list[SfmModel]:
+    content = artifact.header().content
+    count = sum(name.endswith("_image_names") for name in artifact.read_arrays())
+    return [_model(artifact, rank, content) for rank in range(count)]
 
 
 def model_arrays(models: list[SfmModel]) -> dict[str, Any]:

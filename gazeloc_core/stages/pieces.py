@@ -27,7 +27,7 @@ def align_pieces(
     if tags is not None:
         sightings = inputs.load_sightings(project.artifact(recording, "tags").read_arrays())
         corners = inputs.load_corners(project.scan_artifact("corners").read_arrays())
-    models = inputs.load_models(project, recording)
+    models = inputs.load_sfm_models(project, recording)
     camera = inputs.load_undistorted_camera(project, recording)
     pieces = place_pieces(models, camera, sightings, corners, options)
     rows = [
@@ -46,7 +46,7 @@ def align_pieces(
 
 def piece_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the pieces' alignments depend on."""
-    values = {"reconstruction": project.artifact(recording, "reconstruction").header().content}
+    values = {"reconstruction": inputs.sfm_models(project, recording).header().content}
     if project.settings.tags is not None:
         values["tags"] = project.artifact(recording, "tags").header().content
         values["tags on the scan"] = project.scan_artifact("corners").header().content
@@ -77,7 +77,7 @@ def load_pieces(project: Project, recording: str) -> tuple[Piece, ...]:
 def placed_pieces(project: Project, recording: str) -> list[PlacedModel]:
     """The smaller pieces that have a place in the scan, largest first."""
     return [
-        PlacedModel(inputs.load_model(project, recording, piece.rank), piece.alignment.scan_from_sfm)
+        PlacedModel(inputs.load_sfm_model(project, recording, piece.rank), piece.alignment.scan_from_sfm)
         for piece in load_pieces(project, recording)
         if piece.alignment is not None
     ]

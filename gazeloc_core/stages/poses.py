@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
-from gazeloc_core.artifacts import State
+from gazeloc_core.artifacts import Artifact, State
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
 from gazeloc_core.methods import Method
@@ -34,7 +34,7 @@ def sfm_inputs(project: Project, recording: str) -> dict[str, str]:
     chosen = project.settings.chosen.get(recording)
     in_force = chosen_alignment(project, recording).key if chosen is None else chosen.alignment
     return {
-        **_model_inputs(project, recording),
+        **_model_inputs(project, recording, inputs.sfm_models(project, recording)),
         "pieces": project.artifact(recording, "pieces").header().content,
         "alignment": in_force,
     }
@@ -55,11 +55,13 @@ def place_by_method(
 def method_inputs(project: Project, recording: str, method: Method) -> dict[str, str]:
     """The hashes that the poses of `sfm-paper` and `global` depend on."""
     alignment = project.result(recording, method, "alignment").header().content
-    return {**_model_inputs(project, recording), "alignment": alignment}
+    reconstruction = project.artifact(recording, "reconstruction")
+    return {**_model_inputs(project, recording, reconstruction), "alignment": alignment}
 
 
-def _model_inputs(project: Project, recording: str) -> dict[str, str]:
-    return {stage: project.artifact(recording, stage).header().content for stage in ("keyframes", "reconstruction")}
+def _model_inputs(project: Project, recording: str, models: Artifact) -> dict[str, str]:
+    keyframes = project.artifact(recording, "keyframes")
+    return {"keyframes": keyframes.header().content, "reconstruction": models.header().content}
 
 
 def placed_models(project: Project, recording: str, method: Method) -> list[PlacedModel]:
@@ -68,10 +70,11 @@ def placed_models(project: Project, recording: str, method: Method) -> list[Plac
     Raises:
         ProjectError: if the method has not aligned it yet.
     """
-    largest = inputs.load_model(project, recording)
     if method is not Method.SFM:
-        return [PlacedModel(largest, method_alignment(project, recording, method).scan_from_sfm)]
+        scan_from_sfm = method_alignment(project, recording, method).scan_from_sfm
+        return [PlacedModel(inputs.load_model(project, recording), scan_from_sfm)]
     in_force = chosen_alignment(project, recording)
+    largest = inputs.load_sfm_model(project, recording)
     return [PlacedModel(largest, in_force.scan_from_sfm), *placed_pieces(project, recording)]
 
 

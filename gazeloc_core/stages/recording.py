@@ -229,7 +229,7 @@ def triangulate_tags(
     sightings = project.artifact(recording, "tags")
     report(0, "triangulating tag corners")
     corners = triangulate_sfm_corners(
-        inputs.load_model(project, recording),
+        inputs.load_sfm_model(project, recording),
         inputs.load_undistorted_camera(project, recording),
         inputs.load_sightings(sightings.read_arrays()),
         options,
@@ -245,4 +245,7 @@ def triangulate_tags(
 
 def corner_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the tag corners in the reconstruction depend on."""
-    return {stage: project.artifact(recording, stage).header().content for stage in ("tags", "reconstruction")}
+    return {
+        "tags": project.artifact(recording, "tags").header().content,
+        "reconstruction": inputs.sfm_models(project, recording).header().content,
+    }

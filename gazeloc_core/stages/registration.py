@@ -60,7 +60,7 @@ def align_keypoints(
     if groups == 0:
         raise GeometryError(_why_no_keypoints(project, recording))
     try:
-        alignment = align(pairs, options, model=inputs.load_model(project, recording))
+        alignment = align(pairs, options, model=inputs.load_sfm_model(project, recording))
     except GeometryError as error:
         raise GeometryError(f"{recording}: {error}") from error
     save_alignment(project, recording, alignment)
@@ -104,7 +104,7 @@ def align_options(project: Project) -> AlignOptions:
 def alignment_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that an alignment depends on."""
     values = {
-        "reconstruction": project.artifact(recording, "reconstruction").header().content,
+        "reconstruction": inputs.sfm_models(project, recording).header().content,
         "keypoints": project.hash_of_keypoints(recording),
     }
     if project.settings.tags is not None:
@@ -148,7 +148,7 @@ def refine_alignment(
     key = start or fitted_alignment(project, recording)
     refinement = refine(
         load_alignment(project, recording, key),
-        inputs.load_model(project, recording),
+        inputs.load_sfm_model(project, recording),
         inputs.load_raycaster(project),
         correspondences(project, recording),
         options,
@@ -172,7 +172,7 @@ def refinement_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that a refinement depends on."""
     return {
         "scan": inputs.scan_hash(project),
-        "reconstruction": project.artifact(recording, "reconstruction").header().content,
+        "reconstruction": inputs.sfm_models(project, recording).header().content,
         "alignment": fitted_alignment(project, recording),
     }
 

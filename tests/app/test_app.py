@@ -220,7 +220,7 @@ def test_a_full_disk_is_said_and_the_click_is_saved_once_there_is_room(app, proj
 
 
 def test_damaged_artifacts_do_not_take_the_app_along(app, project):
-    for stage in ("reconstruction", "corners"):
+    for stage in ("reconstruction", "anchoring", "corners"):
         (project.artifact("walk", stage).folder / "arrays.npz").write_bytes(b"not arrays")
     (project.artifact("walk", "keyframes").folder / "header.json").write_text("{")
     step(app, JobEnded(Level.INFO, "something ran"))
@@ -230,7 +230,7 @@ def test_damaged_artifacts_do_not_take_the_app_along(app, project):
 
 
 def test_a_damaged_project_opens_with_what_is_whole(project):
-    (project.artifact("walk", "reconstruction").folder / "arrays.npz").write_bytes(b"not arrays")
+    (project.artifact("walk", "anchoring").folder / "arrays.npz").write_bytes(b"not arrays")
     app = App(project, port=0)
     app.store._render()
     app.store.step()

@@ -89,7 +89,8 @@ class AlignmentPanel:
             f"<div>{widgets.colored('●', widgets.LEVEL_COLORS[verdict.level])} {widgets.text(verdict.text)}</div>"
             for verdict in chosen.verdicts
         ]
-        parts += [f"<div>{widgets.text(reason)}</div>" for reason in self._data.piece_reasons(state.recording)]
+        reasons = (self._data.anchoring_reason(state.recording), *self._data.piece_reasons(state.recording))
+        parts += [f"<div>{widgets.text(reason)}</div>" for reason in reasons if reason]
         refinement = self._data.refinement(state.recording)
         if refinement is not None and state.annotation.alignment in (
             refinement["start"],
