@@ -38,12 +38,15 @@ class Hits:
 class Raycaster:
     """Casts rays against one mesh; building it costs about 0.6 s per million triangles."""
 
-    def __init__(self, mesh: Mesh):
-        import open3d as o3d
+    def __init__(self, mesh: Mesh, faces_per_tree: int | None = None):
+        """With `faces_per_tree` the mesh is split over several trees, each built by the first cast.
 
+        Python's GIL is then free again after each: 50,000 faces hold it for 50 ms, a million in one tree for a second.
+        A ray costs about 0.03 ms per tree, so that split ones are for single rays.
+        """
         self.mesh = mesh
-        self._scene = o3d.t.geometry.RaycastingScene()
-        self._scene.add_triangles(_tensor(mesh.vertices.astype(np.float32)), _tensor(mesh.faces.astype(np.uint32)))
+        size = faces_per_tree or len(mesh.faces)
+        self._trees = [_Tree(mesh, first, size) for first in range(0, len(mesh.faces), size)]
 
     def cast(self, origins: ArrayLike, directions: ArrayLike) -> Hits:
         """The first hit of each ray; `origins` and `directions` (N, 3) in the frame `scan`."""
@@ -51,25 +54,13 @@ class Raycaster:
         d = np.asarray(directions, dtype=np.float32).reshape(-1, 3)
         rays = np.concatenate([np.broadcast_to(o, d.shape), d], axis=1)
         rays = np.where(np.isfinite(rays).all(axis=1, keepdims=True), rays, np.float32(0))
-        answer = self._scene.cast_rays(_tensor(np.ascontiguousarray(rays)))
-        faces = answer["primitive_ids"].numpy().astype(np.int64)
-        faces[faces == self._scene.INVALID_ID] = NO_FACE
-        return Hits(
-            answer["t_hit"].numpy().astype(np.float64),
-            faces,
-            answer["primitive_uvs"].numpy().astype(np.float64),
-        )
+        tensor = _tensor(np.ascontiguousarray(rays))
+        return _nearest([tree.cast(tensor) for tree in self._trees])
 
     def closest(self, points: ArrayLike) -> Hits:
         """The place on the mesh nearest to each point (N, 3) in the frame `scan`; `distance` is in metres."""
         p = np.ascontiguousarray(np.asarray(points, dtype=np.float32).reshape(-1, 3))
-        answer = self._scene.compute_closest_points(_tensor(p))
-        distance = np.linalg.norm(answer["points"].numpy().astype(np.float64) - p, axis=1)
-        return Hits(
-            distance,
-            answer["primitive_ids"].numpy().astype(np.int64),
-            answer["primitive_uvs"].numpy().astype(np.float64),
-        )
+        return _nearest([tree.closest(p) for tree in self._trees])
 
     def points(self, hits: Hits) -> Floats:
         """The hit points (N, 3) in the frame `scan`, on the triangles in double precision; NaN for a miss."""
@@ -116,6 +107,47 @@ class Raycaster:
         else:
             colors[ok] = 160
         return colors
+
+
+class _Tree:
+    """The faces from `first` on, `size` at most."""
+
+    def __init__(self, mesh: Mesh, first: int, size: int):
+        import open3d as o3d
+
+        self._first = first
+        faces: NDArray[Any] = mesh.faces[first : first + size]
+        vertices = mesh.vertices
+        if len(faces) < len(mesh.faces):
+            used, corner = np.unique(faces.ravel(), return_inverse=True)
+            faces, vertices = corner.reshape(-1, 3), vertices[used]
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._scene.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(faces.astype(np.uint32)))
+
+    def cast(self, rays: Any) -> Hits:
+        """The first hit of each ray, a tensor (N, 6)."""
+        answer = self._scene.cast_rays(rays)
+        faces = answer["primitive_ids"].numpy().astype(np.int64)
+        faces = np.where(faces == self._scene.INVALID_ID, NO_FACE, faces + self._first)
+        distance, uv = answer["t_hit"].numpy(), answer["primitive_uvs"].numpy()
+        return Hits(distance.astype(np.float64), faces, uv.astype(np.float64))
+
+    def closest(self, points: NDArray[np.float32]) -> Hits:
+        """The nearest place to each point (N, 3)."""
+        answer = self._scene.compute_closest_points(_tensor(points))
+        distance = np.linalg.norm(answer["points"].numpy().astype(np.float64) - points, axis=1)
+        faces = answer["primitive_ids"].numpy().astype(np.int64) + self._first
+        return Hits(distance, faces, answer["primitive_uvs"].numpy().astype(np.float64))
+
+
+def _nearest(of_trees: list[Hits]) -> Hits:
+    """Of every tree's hits of the same N rays or points the nearest."""
+    if len(of_trees) == 1:
+        return of_trees[0]
+    distances = np.stack([hits.distance for hits in of_trees])
+    tree, row = distances.argmin(axis=0), np.arange(distances.shape[1])
+    faces = np.stack([hits.face for hits in of_trees])
+    return Hits(distances[tree, row], faces[tree, row], np.stack([hits.barycentric for hits in of_trees])[tree, row])
 
 
 def _tensor(array: Any) -> Any:  # Open3D's own stubs refuse every NumPy array

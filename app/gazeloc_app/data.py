@@ -38,6 +38,7 @@ from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
 
 T = TypeVar("T")
+FACES_PER_TREE = 50_000
 _log = logging.getLogger(__name__)
 
 
@@ -72,8 +73,8 @@ class ProjectData:
         return colored or self.scan().mesh
 
     def raycaster(self) -> Raycaster:
-        """Rays against the scan's mesh."""
-        return self._remember("raycaster", None, lambda: inputs.load_raycaster(self.project))
+        """Single rays against the scan's mesh, prepared without holding Python's GIL for long."""
+        return self._remember("raycaster", None, lambda: Raycaster(self.scan().mesh, FACES_PER_TREE))
 
     def scan_tags(self) -> TagCorners | None:
         """Tag corners on the scan."""

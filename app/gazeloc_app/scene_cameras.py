@@ -39,6 +39,8 @@ STATUS_COLORS: dict[PoseStatus, Rgb] = {
     PoseStatus.TAG_ONLY: (204, 121, 167),
 }
 """After Okabe and Ito's colours, which colour-blind eyes tell apart."""
+GREY = (100, 106, 114)
+"""Of the truth while the estimates' colours stand for something, green among them."""
 MANY = 400
 """More cameras of one set than this hide the room: unless somebody says otherwise they are thinned out to as many."""
 
@@ -60,11 +62,9 @@ class SceneCameras:
         self._draw_phone(state)
         camera = self._data.camera(state.recording)
         camera = camera if camera is not None and camera.is_pinhole else None
-        truth, tint = self._data.true_keyframes(state.recording), state.layers.tint(Layer.TRUTH)
-        step = self.thinning(state)
-        self._once(
-            "truth", (truth, camera, tint, step), lambda: self.truth.show(_thinned(truth, camera, tint or GREEN, step))
-        )
+        truth, step = self._data.true_keyframes(state.recording), self.thinning(state)
+        color = state.layers.tint(Layer.TRUTH) or (GREEN if state.layers.coloring is Coloring.SET else GREY)
+        self._once("truth", (truth, camera, color, step), lambda: self.truth.show(_thinned(truth, camera, color, step)))
         scale = self.scale(state)
         for method in Method:
             self._draw_method(state, method, camera, step, scale)

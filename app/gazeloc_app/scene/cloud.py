@@ -44,7 +44,8 @@ class CloudLayer:
         if points_in_sfm is None or len(points_in_sfm) == 0:
             return
         if before[0] is not points_in_sfm:
-            self._rows = even_sample(points_in_sfm, MAX_POINTS)
+            rows = even_sample(points_in_sfm, MAX_POINTS)
+            self._rows = np.random.default_rng(0).permutation(rows)  # static/page/detail.js draws a part while moving
         self.drawn = len(self._rows)
         self._handle = self._scene.add_point_cloud(
             self._name,

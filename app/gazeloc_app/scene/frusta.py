@@ -88,7 +88,8 @@ def _lines(cameras: CameraSet | None, depth_m: float) -> tuple[Floats, Ints, Byt
     if cameras is None:
         return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3), dtype=np.uint8)
     pyramids = frustum_points(cameras.scan_from_camera, cameras.camera, depth_m)
-    first = POINTS * np.arange(len(pyramids))[:, None, None]
+    order = np.random.default_rng(0).permutation(len(pyramids))  # static/page/detail.js draws a part while moving
+    first = POINTS * order[:, None, None]
     points, edges = pyramids.reshape(-1, 3), (first + EDGES).reshape(-1, 2)
     each = np.broadcast_to(np.asarray(cameras.colors, dtype=np.uint8), (len(pyramids), 3))
     colors = np.repeat(each, POINTS, axis=0)
@@ -100,6 +101,6 @@ def _lines(cameras: CameraSet | None, depth_m: float) -> tuple[Floats, Ints, Byt
     path_colors = np.broadcast_to(np.asarray(cameras.path_colors, dtype=np.uint8), (len(path), 3))
     return (
         np.concatenate([points, path]),
-        np.concatenate([edges, len(points) + np.column_stack([steps, steps + 1])]),
+        np.concatenate([len(points) + np.column_stack([steps, steps + 1]), edges]),
         np.concatenate([colors, path_colors]),
     )

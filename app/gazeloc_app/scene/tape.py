@@ -10,7 +10,7 @@ from gazeloc_core.arrays import Floats
 from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import Point
 
-COLOR: Rgb = (250, 176, 5)
+COLOR: Rgb = (0, 190, 235)
 _END_RADIUS_M = 0.015
 
 

@@ -1,0 +1,53 @@
+// While the view moves and a frame takes long, a quarter of the lines and points is drawn; all again when it rests.
+// The server sends both in a shuffled order, so that any first part of them is spread evenly.
+(function spareDetail() {
+  const viewer = window.__viserMutable;
+  const scene = viewer && viewer.scene;
+  if (!scene || !Object.hasOwn(scene, "onBeforeRender")) {
+    setTimeout(spareDetail, 60); // true-colors.js sets its own hook first
+    return;
+  }
+  const SLOW_MS = 90;
+  const REST_MS = 250;
+  const SHARE = 0.25;
+  const before = scene.onBeforeRender;
+  let seen = "";
+  let drawnAt = 0;
+  let isSparing = false;
+  let rest = 0;
+
+  function draw(share) {
+    for (const [name, node] of Object.entries(viewer.nodeRefFromName)) {
+      if (!node || !(name.startsWith("/frusta/") || name === "/sfm/cloud")) continue;
+      node.traverse((part) => {
+        if (!part.isLineSegments && !part.isPoints) return;
+        const geometry = part.geometry;
+        const source = geometry.index || geometry.attributes.position;
+        if (!source) return;
+        geometry.setDrawRange(0, share < 1 ? 2 * Math.floor((source.count * share) / 2) : Infinity);
+      });
+    }
+  }
+
+  function settle() {
+    isSparing = false;
+    draw(1);
+    viewer.requestRender();
+  }
+
+  scene.onBeforeRender = function (renderer, drawn, camera, ...others) {
+    before.call(this, renderer, drawn, camera, ...others);
+    const now = performance.now();
+    const view = camera.matrixWorld.elements.join() + camera.projectionMatrix.elements.join();
+    const moves = view !== seen && seen !== "";
+    const took = now - drawnAt;
+    seen = view;
+    drawnAt = now;
+    if (!moves) return;
+    if (took > SLOW_MS && took < 5000) isSparing = true;
+    if (!isSparing) return;
+    draw(SHARE);
+    clearTimeout(rest);
+    rest = setTimeout(settle, REST_MS);
+  };
+})();
