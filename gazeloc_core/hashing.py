@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gazeloc_core.errors import InputError
 
@@ -25,6 +27,7 @@ class FileHasher:
     def __init__(self, memory: Path):
         self._memory = memory
         self._known: dict[str, str] = {}
+        self._has_news = False
         try:
             self._known = dict(json.loads(memory.read_text()))
         except (OSError, ValueError):
@@ -40,13 +43,13 @@ class FileHasher:
             return self._hash_of_file(path)
         if not path.is_dir():
             raise InputError.of(path, "the file or folder is missing", "restore it or choose another")
-        files = sorted(
-            p for p in path.rglob("*") if p.is_file() and not any(x.startswith(".") for x in p.relative_to(path).parts)
-        )
-        return hash_of_value([[p.relative_to(path).as_posix(), self._hash_of_file(p)] for p in files])
+        files = sorted(_files_below(path, os.path.realpath(path)), key=lambda file: file.parts)
+        return hash_of_value([["/".join(file.parts), self._hash_of(file.real, file.size, file.time)] for file in files])
 
     def remember(self) -> None:
-        """Write the memory, if the place can be written to."""
+        """Write the memory where it has grown, if the place can be written to."""
+        if not self._has_news:
+            return
         try:
             self._memory.parent.mkdir(parents=True, exist_ok=True)
             part = self._memory.with_suffix(".part")
@@ -57,11 +60,39 @@ class FileHasher:
 
     def _hash_of_file(self, path: Path) -> str:
         stat = path.stat()
-        key = f"{path.resolve()}|{stat.st_size}|{stat.st_mtime_ns}"
+        return self._hash_of(str(path.resolve()), stat.st_size, stat.st_mtime_ns)
+
+    def _hash_of(self, real: str, size: int, time: int) -> str:
+        key = f"{real}|{size}|{time}"
         if key not in self._known:
             digest = hashlib.blake2b(digest_size=DIGITS // 2)
-            with path.open("rb") as file:
+            with open(real, "rb") as file:
                 while chunk := file.read(_CHUNK):
                     digest.update(chunk)
             self._known[key] = digest.hexdigest()
+            self._has_news = True
         return self._known[key]
+
+
+class _File(NamedTuple):
+    """A file below a folder: its name there in parts, where it really is, its size and time of change in ns."""
+
+    parts: tuple[str, ...]
+    real: str
+    size: int
+    time: int
+
+
+def _files_below(folder: Path | str, real: str, parts: tuple[str, ...] = ()) -> Iterator[_File]:
+    """All files but hidden ones. Recordings may be folders of ten thousand pictures, so no `Path` for each."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith("."):
+                continue
+            is_link, place = entry.is_symlink(), os.path.join(real, entry.name)
+            if entry.is_file():
+                stat = entry.stat()
+                where = os.path.realpath(entry.path) if is_link else place
+                yield _File((*parts, entry.name), where, stat.st_size, stat.st_mtime_ns)
+            elif entry.is_dir() and not is_link:
+                yield from _files_below(entry.path, place, (*parts, entry.name))

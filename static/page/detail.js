@@ -48,6 +48,6 @@
     if (!isSparing) return;
     draw(SHARE);
     clearTimeout(rest);
-    rest = setTimeout(settle, REST_MS);
+    rest = setTimeout(settle, Math.max(REST_MS, 1.5 * took)); // not between two slow frames
   };
 })();
