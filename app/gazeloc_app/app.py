@@ -30,11 +30,14 @@ from gazeloc_app.door.login import needs_token, new_token
 from gazeloc_app.job_list import JobList
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
+from gazeloc_app.looks import Look
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.camera_colors import CameraColors
 from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
+from gazeloc_app.panels.first_steps import FirstSteps
 from gazeloc_app.panels.frames import FramePanel
+from gazeloc_app.panels.help import HelpPanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
@@ -120,6 +123,7 @@ class App:
             )
             undo.pop_all()
         self._browsers: dict[int, Browser] = {}
+        self._looks: dict[int, Look] = {}
         self._last_job = 0
         self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch)
         self.store.add_view(self.scene.render)
@@ -176,6 +180,7 @@ class App:
         job_bar = JobBar(gui, dispatch)
         tabs = gui.add_tab_group(order=1000)
         with tabs.add_tab("Project"):
+            self._first_steps = FirstSteps(gui, self.data)
             project_panel = ProjectPanel(gui, self.project, state, dispatch, self._open_recording)
             job_logs = JobLogs(gui, str(self.project.folder / "logs"))
         with tabs.add_tab("Keypoints"):
@@ -200,6 +205,8 @@ class App:
             frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
         with side.add_tab("Problems"):
             problem_panel = ProblemPanel(gui, self.data, dispatch)
+        with side.add_tab("Help"):
+            self._help = HelpPanel(gui, self._toggle_look)
         side.dock_left()
         side.set_width(430)
         work = (project_panel, keypoint_panel, keypoint_files, suggestion_panel, alignment_panel)
@@ -213,7 +220,7 @@ class App:
             frame_panel,
             problem_panel,
         )
-        for panel in (job_bar, job_logs, *work, *looks):
+        for panel in (job_bar, self._first_steps, job_logs, *work, *looks):
             self.store.add_view(panel.render)
 
     def _usual_views(self) -> dict[str, SavedView]:
@@ -245,13 +252,22 @@ class App:
     async def _connected(self, client: viser.ClientHandle) -> None:
         browser = Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
         self._browsers[client.client_id] = browser
+        self._looks[client.client_id] = look = Look(client)
+        self._help.show((self.server.gui, client.gui))
+        look.remember()
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._browsers.pop(client.client_id, None)
+        self._looks.pop(client.client_id, None)
 
     def _render_browsers(self, state: AppState) -> None:
         for browser in list(self._browsers.values()):
             browser.render(state)
+
+    def _toggle_look(self, client_id: int) -> None:
+        look = self._looks.get(client_id)
+        if look is not None:
+            look.toggle()
 
     def _look_through(self, client_id: int, frame: int) -> None:
         browser = self._browsers.get(client_id)

@@ -52,7 +52,9 @@ class Cut:
                 )
                 self._sliders.append((slider, ends[0], size))
                 widgets.on_user(slider, lambda _: self._changed())
-            self._whole = client.gui.add_button("Whole again", visible=False, color="gray")
+            self._whole = client.gui.add_button(
+                "Whole again", visible=False, color="gray", hint="Nothing is cut away any more."
+            )
         widgets.on_user(self._whole, lambda _: self._undo(), event="on_click")
 
     def leaves(self, point_in_scan: Floats) -> bool:

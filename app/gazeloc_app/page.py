@@ -13,6 +13,7 @@ from functools import lru_cache
 
 from websockets.http11 import Response
 
+from gazeloc_app import palette
 from gazeloc_core.resources import static_files
 
 _PAGES = ("/", "/index.html")
@@ -39,6 +40,8 @@ def _dressed(body: bytes, is_zipped: bool, title: str) -> bytes:
 
 def _head() -> str:
     files = [(path.suffix, path.read_text(encoding="utf-8")) for path in static_files("page")]
+    icon = '<link rel="icon" type="image/svg+xml" href="/static/favicon.svg">\n'
+    colors = f"<style>\n{palette.css()}</style>\n"
     styles = [f"<style>\n{text}</style>\n" for suffix, text in files if suffix == ".css"]
     scripts = [f"<script>\n{text}</script>\n" for suffix, text in files if suffix == ".js"]
-    return "".join([*styles, *scripts])
+    return "".join([icon, colors, *styles, *scripts])

@@ -14,6 +14,7 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
 from gazeloc_app.gaze_at import gaze_in_scan
+from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.render_process import RenderProcess
@@ -42,8 +43,6 @@ SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
 WHITE = (255, 255, 255)
 FILTERED_OUT = (120, 120, 120)
 """Points under a tag that the paper's filter drops."""
-BACKGROUND = (233, 236, 239)
-"""Light, but not white: holes in the scan are seen as holes, white walls as walls."""
 THUMBNAIL_PX = 320
 GLIMPSE_POINTS = 60_000
 
@@ -61,7 +60,7 @@ class SceneView:
         self._server, self._data, self._render = server, data, render
         self._screen = ScanScreen(data, render, dispatch)
         scene = server.scene
-        scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8), format="png")
+        set_background(scene)
         self._once = Once()
         self._mesh: Mesh | None = None
         self.front = 0

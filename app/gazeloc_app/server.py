@@ -30,6 +30,7 @@ from gazeloc_app.door.hosts import Hosts, Refusal, is_websocket, own_hosts
 from gazeloc_app.door.limits import MAX_MESSAGE_BYTES
 from gazeloc_app.door.login import Login, needs_token
 from gazeloc_app.door.paths import is_plain
+from gazeloc_app.looks import set_theme
 from gazeloc_app.page import dress
 from gazeloc_app.routes import Reply, Routes
 from gazeloc_core.errors import InputError
@@ -98,7 +99,6 @@ def make_server(
     *,
     host: str = "127.0.0.1",
     title: str = "GazeLoc",
-    dark_mode: bool = False,
     allow_hosts: Sequence[str] = (),
     token: str | None = None,
 ) -> viser.ViserServer:
@@ -127,9 +127,7 @@ def make_server(
         listener.close()
         raise
     _forbid_sharing(server)
-    server.gui.configure_theme(
-        dark_mode=dark_mode, show_logo=False, show_share_button=False, brand_color=(28, 110, 140)
-    )
+    set_theme(server.gui)
     _set_even_light(server)
     return server
 

@@ -6,7 +6,9 @@ import html
 from collections.abc import Callable, Sequence
 from typing import Any
 
-GOOD, WARNING, BAD, MUTED = "#2b8a3e", "#b35900", "#c92a2a", "#868e96"
+from gazeloc_app import palette
+
+GOOD, WARNING, BAD, MUTED = (palette.meaning(name) for name in palette.TEXT_MEANINGS)
 LEVEL_COLORS = {"good": GOOD, "info": MUTED, "warning": WARNING, "bad": BAD, "error": BAD}
 
 
@@ -50,16 +52,20 @@ def colored(value: object, color: str) -> str:
 
 def box(content: str) -> str:
     """HTML in the panel's type and padding."""
-    return f'<div style="font-size:12px;line-height:1.45;padding:2px 10px 4px">{content}</div>'
+    return f'<div class="gazeloc-box">{content}</div>'
+
+
+def card(head: str, sentence: str) -> str:
+    """What to do first where there is nothing to show yet; both are text."""
+    return f'<div class="gazeloc-card"><p><b>{text(head)}</b></p>{text(sentence)}</div>'
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table; cells are HTML already, heads are text."""
-    cell = 'style="padding:1px 6px 1px 0;text-align:left;vertical-align:top"'
-    lines = ["".join(f"<th {cell}>{text(name)}</th>" for name in head)]
-    lines += ["".join(f"<td {cell}>{value}</td>" for value in row) for row in rows]
+    lines = ["".join(f"<th>{text(name)}</th>" for name in head)] if any(head) else []
+    lines += ["".join(f"<td>{value}</td>" for value in row) for row in rows]
     body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f'<table style="border-collapse:collapse;width:100%">{body}</table>'
+    return f"<table>{body}</table>"
 
 
 def centimetres(value_m: float | None) -> str:

@@ -29,6 +29,13 @@ METHODS = {
 }
 
 
+NONE_YET = widgets.card(
+    "No alignment yet.",
+    "The reconstruction stands in the middle of the scan until it has one. Tags that both saw, or three keypoints, "
+    "make one: press Align.",
+)
+
+
 class AlignmentPanel:
     """The buttons, the alignments there are, and what speaks for the one in force."""
 
@@ -80,7 +87,7 @@ class AlignmentPanel:
 
     def _evidence_html(self, state: AppState, chosen: Alignment | None) -> str:
         if chosen is None:
-            return "No alignment yet: the reconstruction is shown in its own frame, at the scan's middle."
+            return NONE_YET
         before = self._data.alignment(state.recording, chosen.parent)
         columns = [("", chosen)] if before is None else [("before", before), ("after", chosen)]
         rows = [[widgets.text(name), *(_cell(alignment) for _, alignment in columns)] for name, _cell in _ROWS]

@@ -32,7 +32,7 @@ class FigurePanel:
             color="gray",
             hint="Section IX: the safe range of a tag; which size and number this room needs. Minutes the first time.",
         )
-        self._which = gui.add_dropdown("Figure", (NONE,))
+        self._which = gui.add_dropdown("Figure", (NONE,), hint="Which of the figures that were drawn shows.")
         self._notes = gui.add_html("")
         self._plot = gui.add_plotly(go.Figure(), aspect=0.9, visible=False)
         widgets.on_user(self._draw, lambda _: self._start("Draw the figures", tasks.draw_figures), event="on_click")

@@ -52,7 +52,7 @@ class FramePanel:
         self._seen_timeline: object = None
         self._others: dict[str, str] = {NOTHING: ""}
         self._comparison = ComparisonHtml(gui, template, data)
-        self._slider = gui.add_slider("Frame", 0, 1, 1, 0)
+        self._slider = gui.add_slider("Frame", 0, 1, 1, 0, hint="Which frame of the recording shows, everywhere.")
         self._timeline = gui.add_html("")
         self._facts = gui.add_html("")
         self._marks = MarkWidgets(gui, dispatch)

@@ -40,7 +40,7 @@ class KeypointFiles:
             self._upload: Any = gui.add_upload_button(
                 "Read keypoints", hint="JSON, CSV, a list picked in CloudCompare, Stray's keypoints.json. One undo."
             )
-            self._format = gui.add_dropdown("Format", tuple(FORMATS))
+            self._format = gui.add_dropdown("Format", tuple(FORMATS), hint="Of the file that is saved.")
             self._save = gui.add_button("Save keypoints", color="gray", hint="Saves a file on your computer.")
         widgets.on_user(self._upload, lambda event: self._read(event.target.value), event="on_upload")
         widgets.on_user(self._save, lambda event: self._send(event.client), event="on_click")

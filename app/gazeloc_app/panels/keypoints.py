@@ -21,6 +21,11 @@ RULES = (
     "(reconstructions blur edges); far apart from each other, in all directions. Three pairs at least, six are better."
 )
 
+NONE_YET = widgets.card(
+    "No keypoint yet.",
+    "Hold Shift and click a spot on the scan, then that spot of the reconstruction: among its points, or in two frames "
+    "that you look through. “A click” above says what a click does.",
+)
 LEGEND = (
     f'<div style="color:{widgets.MUTED}">cm and px: how far the two sides are apart. left out: the same in cm where '
     "the others alone decide. moves: by how many cm the cameras move without the pair. ✗: it disagrees, not used.</div>"
@@ -38,10 +43,10 @@ class KeypointPanel:
         gui.add_html(widgets.box(RULES))
         self._table = gui.add_html("")
         self._selected = gui.add_dropdown("Selected", (NEW,), hint="The next click completes this pair.")
-        self._name = gui.add_text("Name", "")
+        self._name = gui.add_text("Name", "", hint="What it is, e.g. “corner of the desk”.")
         self._enabled = gui.add_checkbox("Counts", True, hint="Whether the pair takes part in the alignment.")
-        self._delete = gui.add_button("Delete the pair", color="red")
-        self._steps = gui.add_button_group("", ("Undo", "Redo"))
+        self._delete = gui.add_button("Delete the pair", color="red", hint="Both its sides; Undo brings it back.")
+        self._steps = gui.add_button_group("", ("Undo", "Redo"), hint="Ctrl Z and Ctrl Y do the same.")
         widgets.on_user(self._selected, lambda event: dispatch(SelectPair(self._key_of(str(event.target.value)))))
         widgets.on_user(
             self._name, lambda event: self._if_selected(lambda key: RenamePair(key, str(event.target.value)))
@@ -71,7 +76,7 @@ class KeypointPanel:
         residuals = pair_residuals(self._data, state)
         rows = [_row(pair, residuals.get(pair.key), pair.key == state.selected_key) for pair in keypoints]
         head = ["", "Name", "Scan", "SfM", "cm", "px", "left out", "moves"]
-        table = f"{widgets.html_table(head, rows)}{LEGEND if residuals else ''}" if rows else "No pair yet."
+        table = f"{widgets.html_table(head, rows)}{LEGEND if residuals else ''}" if rows else NONE_YET
         widgets.set_content(self._table, widgets.box(f'<div id="gazeloc-pairs">{table}</div>'))
         selected = keypoints.get(state.selected_key) if state.selected_key else None
         options = (NEW, *(_label(pair) for pair in keypoints))

@@ -43,8 +43,10 @@ class LayerPanel:
             self._boxes[layer] = box
         self._note = gui.add_html("")
         with gui.add_folder("Tint", expand_by_default=False):
-            self._which = gui.add_dropdown("Layer", tuple(layer.value for layer in TINTABLE))
-            self._color = gui.add_rgb("Colour", (255, 160, 60))
+            self._which = gui.add_dropdown(
+                "Layer", tuple(layer.value for layer in TINTABLE), hint="What the colour is for."
+            )
+            self._color = gui.add_rgb("Colour", (255, 160, 60), hint="Instead of the layer's own colours.")
             self._own = gui.add_button("Own colours", hint="Take the tint away.")
         widgets.on_user(
             self._color, lambda event: dispatch(TintLayer(Layer(self._which.value), _rgb(event.target.value)))

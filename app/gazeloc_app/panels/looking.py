@@ -51,7 +51,7 @@ class LookingControls:
             color="gray",
             hint="Of the selected keypoint: goes to the next frame in whose picture it is, and nothing hides it.",
         )
-        self._leave = gui.add_button("Leave the frame", visible=False, color="gray")
+        self._leave = gui.add_button("Leave the frame", visible=False, color="gray", hint="Back into the room.")
         widgets.on_user(self._phone, lambda event: self._show_phone(int(event.target.value)))
         widgets.on_user(self._next, lambda _: self._go_on(), event="on_click")
         widgets.on_user(self._leave, lambda _: self.leave(), event="on_click")

@@ -54,7 +54,9 @@ class ViewList:
         self._rows = {}
         with self._folder:
             for name in names:
-                row = self._server.gui.add_button_group(name, (_GO, _REMOVE))
+                row = self._server.gui.add_button_group(
+                    name, (_GO, _REMOVE), hint="A saved view: go to it, or forget it."
+                )
                 widgets.on_user(row, partial(self._pressed, name), event="on_click")
                 self._rows[name] = row
 

@@ -1,0 +1,124 @@
+"""What the app says about itself: hints on everything that can be pressed, keys, first steps, light and dark."""
+
+import asyncio
+from unittest.mock import MagicMock
+
+import pytest
+from app_project import make_app_project
+from app_steps import step, stop
+from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.app import App
+from gazeloc_app.looks import Look
+from gazeloc_app.panels.help import WORDS, commands_of
+from viser import ViserServer
+from visitor import CAMERA, get, page, until
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory):
+    app = App(make_app_project(tmp_path_factory.mktemp("project")), port=0)
+    app.store._render()
+    yield app
+    stop(app)
+
+
+def while_connected(app, look):
+    """What `look(client)` says of a connected browser."""
+
+    async def talk():
+        async with page(app.server.get_port()) as visitor:
+            await visitor.send(CAMERA)
+            await until(lambda: app.server.get_clients())
+            await until(lambda: app._browsers)
+            (client,) = app.server.get_clients().values()
+            return look(client)
+
+    return asyncio.run(talk())
+
+
+def without_hint(gui):
+    handles = gui._gui_input_handle_from_uuid.values()
+    return [getattr(handle, "label", "?") for handle in handles if not (getattr(handle, "hint", "x") or "").strip()]
+
+
+def test_everything_that_can_be_pressed_or_set_says_what_it_does(app):
+    assert len(app.server.gui._gui_input_handle_from_uuid) > 20
+    assert without_hint(app.server.gui) == []
+
+
+def test_so_does_what_belongs_to_one_browser(app):
+    assert while_connected(app, lambda client: without_hint(client.gui)) == []
+
+
+def test_every_command_is_in_the_help_with_its_key(app):
+    def look(client):
+        return [*commands_of(app.server.gui), *commands_of(client.gui)], app._help._keys.content
+
+    commands, text = while_connected(app, look)
+    assert ("Ctrl Z", "Undo") in [(key, name.partition(":")[0]) for key, name in commands]
+    for key, name in commands:
+        assert f"<kbd>{key}</kbd>" in text
+        assert name.replace("&", "&amp;").replace("'", "&#x27;") in text
+    for word, _ in WORDS:
+        assert f"<i>{word}</i>" in text
+
+
+def test_no_key_does_two_things(app):
+    commands = while_connected(app, lambda client: [*commands_of(app.server.gui), *commands_of(client.gui)])
+    keys = [key for key, _ in commands if key != "–"]
+    assert len(keys) == len(set(keys))
+
+
+def test_viser_still_keeps_commands_where_the_help_looks_for_them():
+    server = ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        server.gui.add_command("Do it", hotkey="K", modifier="cmd/ctrl+shift", description="at once")
+        server.gui.add_command("Or not")
+        assert commands_of(server.gui) == [("Ctrl Shift K", "Do it: at once"), ("–", "Or not")]
+    finally:
+        server.stop()
+
+
+def test_the_first_steps_say_what_comes_next(app):
+    def card():
+        return app._first_steps._card
+
+    assert "Align.</b>" in card().content
+    assert "✓ Process" in card().content
+    step(app, PickPoint(Side.SCAN, (1, 2, 0.5)))
+    assert "1 of 3 keypoints" in card().content
+
+
+def test_the_logo_and_the_icon_are_there(app):
+    for name in ("logo-light.svg", "logo-dark.svg", "favicon.svg"):
+        status, headers, body = get(app.server.get_port(), f"/static/{name}")
+        assert (status, headers["Content-Type"]) == (200, "image/svg+xml")
+        assert b"<svg" in body
+    text = get(app.server.get_port())[2].decode()
+    assert 'href="/static/favicon.svg"' in text
+    assert text.index("--gazeloc-good") < text.index("</head>")
+
+
+def look_of(stored):
+    client = MagicMock()
+    if isinstance(stored, Exception):
+        client.local_storage.get_item.side_effect = stored
+    else:
+        client.local_storage.get_item.return_value = stored
+    return Look(client), client
+
+
+@pytest.mark.parametrize("stored", [None, "light", "purple", "<script>", RuntimeError("gone"), TimeoutError("slow")])
+def test_a_browser_that_says_nothing_of_the_dark_is_light(stored):
+    look, client = look_of(stored)
+    asyncio.run(look._remember())
+    client.gui.configure_theme.assert_not_called()
+
+
+def test_the_dark_is_remembered_by_the_browser():
+    look, client = look_of("dark")
+    asyncio.run(look._remember())
+    assert client.gui.configure_theme.call_args.kwargs["dark_mode"] is True
+    look.toggle()
+    assert client.gui.configure_theme.call_args.kwargs["dark_mode"] is False
+    client.local_storage.set_item.assert_called_with("gazeloc-look", "light")
