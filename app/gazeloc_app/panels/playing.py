@@ -26,7 +26,9 @@ class PlayWidgets:
         self._data, self._dispatch = data, dispatch
         self._state: AppState | None = None
         self._play = gui.add_button("▶ Play", hint="The space bar. All browsers see the frame go on.")
-        self._speed = gui.add_dropdown("Speed", tuple(_SPEED_NAMES), initial_value="1×", hint="Of playing, against real time.")
+        self._speed = gui.add_dropdown(
+            "Speed", tuple(_SPEED_NAMES), initial_value="1×", hint="Of playing, against real time."
+        )
         steps = gui.add_button_group("", _STEPS, hint="The arrow keys step, too.")
         problems = gui.add_button_group(
             "", _PROBLEMS, hint="No pose, a low score, or marked bad or unsure. The key N goes to the next."

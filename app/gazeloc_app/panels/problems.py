@@ -45,7 +45,9 @@ class ProblemPanel:
             hint="How well each frame agrees with the scan seen from its pose; goes on where it was.",
         )
         self._summary = gui.add_html("")
-        self._which = gui.add_dropdown("Frames", tuple(Which), initial_value=Which.WORST, hint="Which frames the list holds.")
+        self._which = gui.add_dropdown(
+            "Frames", tuple(Which), initial_value=Which.WORST, hint="Which frames the list holds."
+        )
         self._list = gui.add_html("")
         widgets.on_user(self._score, lambda _: self._start(), event="on_click")
         widgets.on_user(self._which, lambda _: self._render_list())
