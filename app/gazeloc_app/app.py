@@ -27,6 +27,7 @@ from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
+from gazeloc_app.follow_up import ScoreAfterRun
 from gazeloc_app.job_list import JobList
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
@@ -145,6 +146,7 @@ class App:
     def start(self) -> None:
         """Render everything and start the loop; load what the first click and the first picture need."""
         self._go_to_first_pose(self.store.state)
+        self.store.add_effect(ScoreAfterRun(self.store.dispatch))
         self.store.start()
         self.live.start()
         self._player.start()

@@ -18,6 +18,7 @@ from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.display_mesh import shaded
 from gazeloc_core.errors import GazelocError, InputError, RenderError
+from gazeloc_core.frames import FrameSource
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.render import RayRenderer, Rendered, Renderer, open_renderer
@@ -26,6 +27,7 @@ from gazeloc_core.tag_drawing import draw_tags, drawn_tags
 from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.transforms import rigid_from_wxyz
 from gazeloc_core.undistort import Undistorter
+from gazeloc_core.video_cursor import VideoCursor, cursor_of
 
 JPEG_QUALITY = 90
 _log = logging.getLogger(__name__)
@@ -151,7 +153,7 @@ class _Studio:
         self._raycaster: Raycaster | None = None
         self._renderer: Renderer | None = None
         self._rays: RayRenderer | None = None
-        self._recordings: dict[str, tuple[Recording, Undistorter]] = {}
+        self._recordings: dict[str, tuple[Recording, FrameSource | VideoCursor, Undistorter]] = {}
 
     def answer(self, job: Job) -> Any:
         match job:
@@ -199,11 +201,11 @@ class _Studio:
             raise InputError(f"There is no recording {job.recording!r}.")
         if job.recording not in self._recordings:
             opened = self._sources.recordings[job.recording]()
-            self._recordings[job.recording] = (opened, Undistorter.of(opened.camera))
-        recording, undistorter = self._recordings[job.recording]
+            self._recordings[job.recording] = (opened, cursor_of(opened.frames), Undistorter.of(opened.camera))
+        recording, frames, undistorter = self._recordings[job.recording]
         if not 0 <= job.index < len(recording):
             raise InputError(f"There is no frame {job.index}; the recording {job.recording!r} has {len(recording)}.")
-        image = recording.frames.read(job.index)
+        image = frames.read(job.index)
         if job.as_recorded:
             return image
         image = undistorter.image(image)

@@ -1,6 +1,6 @@
 """`make bench`: every number that the issue of this product and its README name, measured now, with its target.
 
-    python tests/benchmarks [alignment | suggestions | scene | chair | bedroom | app | agreement | size | door] ...
+    python tests/benchmarks [NAME] ...     of those in BENCHES below
 
 Exit code 1 where a target is missed. Times are of this machine at this moment; ratios hold on noisy ones.
 """
@@ -92,6 +92,24 @@ def door(work: Path) -> list[Row]:
     return bench_door(work)
 
 
+def scrubbing(work: Path) -> list[Row]:
+    """Going through frames in a headless browser."""
+    from bench_app import _app, _project
+    from bench_scrub import bench_scrub
+    from e2e.page import chromium_path, launch
+    from playwright.sync_api import sync_playwright
+
+    path = chromium_path()
+    if path is None:
+        return [("scrubbing: not measured, no chromium is installed", "", False)]
+    project = _project(work)
+    with sync_playwright() as playwright, _app(project) as app:
+        browser = launch(playwright, path)
+        rows = bench_scrub(browser, app)
+        browser.close()
+    return rows
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
     "suggestions": suggestions,
@@ -100,6 +118,7 @@ BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "bedroom": real_bedroom,
     "app": browser_app,
     "agreement": agreement,
+    "scrub": scrubbing,
     "size": scene_at_size,
     "door": door,
 }

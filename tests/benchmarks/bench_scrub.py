@@ -1,0 +1,93 @@
+"""Scrubbing in a headless browser: from the slider to both pictures on screen, and whether the last one is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+from e2e.page import ViewerPage
+from gazeloc_app.app import App
+from playwright.sync_api import Browser
+
+Row = tuple[str, str, bool]
+SIZE = {"width": 1280, "height": 900}
+_WATCH = """
+() => {
+  window.__scrub = null;
+  addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter') return;
+    const start = performance.now(), wanted = String(Number(event.target.value));
+    const look = () => {
+      const stage = document.querySelector('.gazeloc-stage');
+      if (stage.dataset.shown === wanted) requestAnimationFrame(() => { window.__scrub = performance.now() - start; });
+      else setTimeout(look, 1);
+    };
+    look();
+  }, {capture: true, once: true});
+}
+"""
+
+
+def bench_scrub(browser: Browser, app: App, count: int = 12) -> list[Row]:
+    """Frames that no cache has, the same ones again, and quick moves."""
+    viewer = ViewerPage(browser.new_context(viewport=SIZE).new_page()).open(app.address)
+    page = viewer.page
+    page.wait_for_selector(".gazeloc-stage[data-shown]", timeout=120_000)
+    frames = _frames_with_poses(app, count)
+    _time(viewer, frames[0])  # the first one opens the video and the renderer
+    page.wait_for_timeout(4000)
+    times: dict[str, list[float]] = {"not cached": [], "cached": []}
+    for frame in frames[1:]:
+        times["not cached"].append(_time(viewer, frame))
+        page.wait_for_timeout(3000)  # until it has looked ahead
+    for frame in frames[1:]:
+        times["cached"].append(_time(viewer, frame))
+        page.wait_for_timeout(100)
+    rows = [_row(name, limit, times[name], app) for name, limit in (("cached", 60), ("not cached", 400))]
+    rows.append(_quick(viewer, app))
+    page.context.close()
+    return rows
+
+
+def _row(name: str, limit_ms: int, times_ms: list[float], app: App) -> Row:
+    camera = app.data.recording(app.store.state.recording).camera
+    median, worst = float(np.median(times_ms)), max(times_ms)
+    what = f"scrubbing at {camera.width}x{camera.height}, {name}: slider to both pictures <= {limit_ms} ms"
+    return what, f"median {median:.0f} ms, worst {worst:.0f} ms of {len(times_ms)}", median <= limit_ms
+
+
+def _quick(viewer: ViewerPage, app: App, moves: int = 30) -> Row:
+    """Moves 40 ms apart to frames far apart; then the last one, and nothing after it."""
+    rng, page = np.random.default_rng(1), viewer.page
+    frames = _frames_with_poses(app, 400)
+    targets = rng.choice(frames, moves, replace=False).tolist()
+    recording = app.store.state.recording
+    for frame in targets:
+        page.evaluate("url => { fetch(url); }", f"/show/{recording}/{frame}")
+        page.wait_for_timeout(40)
+    started = page.evaluate("performance.now()")
+    shown = f'.gazeloc-stage[data-shown="{targets[-1]}"]'
+    try:
+        page.wait_for_selector(shown, timeout=15_000)
+        took = float(page.evaluate("performance.now()")) - started
+        page.wait_for_timeout(1500)
+        is_last = page.locator(shown).count() == 1
+    except Exception:
+        return f"{moves} quick moves: the last one is shown", "never", False
+    return f"{moves} quick moves: the last one is shown", f"{took:.0f} ms after the last move", is_last
+
+
+def _time(viewer: ViewerPage, frame: int) -> float:
+    field = viewer.page.locator("label", has_text="Frame").first.locator("xpath=ancestor::div[.//input][1]")
+    box = field.locator("input:not([type=hidden])").first
+    viewer.page.evaluate(_WATCH)
+    box.fill(str(frame))
+    box.press("Enter")
+    viewer.page.wait_for_function("() => window.__scrub !== null", timeout=30_000, polling=20)
+    return float(viewer.page.evaluate("window.__scrub"))
+
+
+def _frames_with_poses(app: App, count: int) -> list[int]:
+    state = app.store.state
+    trajectory = app.data.trajectory(state.recording, app.data.poses_key(state.recording, state.annotation))
+    assert trajectory is not None
+    known = np.flatnonzero(trajectory.has_pose)
+    return [int(frame) for frame in known[np.linspace(10, len(known) - 10, min(count, len(known) - 20)).astype(int)]]
