@@ -22,7 +22,7 @@ from gazeloc_app import tasks
 from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
 from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
-from gazeloc_app.actions.views import NameRenderer, ShowFrame
+from gazeloc_app.actions.views import BeginAt, NameRenderer
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
@@ -299,7 +299,7 @@ class App:
     def _go_to_first_pose(self, state: AppState) -> None:
         trajectory = self.data.trajectory(state.recording, self.data.poses_key(state.recording, state.annotation))
         if trajectory is not None and trajectory.is_localised.any():
-            self.store.dispatch(ShowFrame(int(np.flatnonzero(trajectory.is_localised)[0])))
+            self.store.dispatch(BeginAt(int(np.flatnonzero(trajectory.is_localised)[0])))
 
     def _start_job(self, before: AppState, after: AppState) -> None:
         del before

@@ -62,7 +62,9 @@ class Pictures:
             raise InputError(f"Frame {index} has no pose, so there is no render of it.")
         w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
         cx, cy, cz = (float(value) for value in pose.translation)
-        job = Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=WIDTH_PX)
+        job = Render(
+            camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=min(WIDTH_PX, camera.width)
+        )
         kind = f"render {query.get('rev')}"  # poses side by side do not push each other aside
         return await self._picture(kind, recording, index, job)
 

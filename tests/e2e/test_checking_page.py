@@ -19,17 +19,20 @@ pytestmark = pytest.mark.e2e
 
 
 @pytest.fixture
-def page(tmp_path, open_page):
+def app(tmp_path):
     project = make_app_project(tmp_path)
     alignment = align_keypoints(project, "walk")
     project.choose("walk", Chosen(alignment=alignment.key, by_person=True))
     run_after_choice(project, "walk", Method.SFM)
     app = App(project, port=0)
     app.start()
-    viewer = open_page(app.address, width=1200, height=900)
-    yield AppPage(viewer, app)
-    viewer.page.context.close()
+    yield app
     app.stop()
+
+
+@pytest.fixture
+def page(app, open_page):
+    return AppPage(open_page(app.address, width=1200, height=900), app)
 
 
 def shown(page, frame):

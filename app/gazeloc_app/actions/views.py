@@ -19,6 +19,17 @@ class ShowFrame:
 
 
 @dataclass(frozen=True)
+class BeginAt:
+    """The first frame worth showing is known; it is not shown where somebody went to another one meanwhile."""
+
+    frame: int
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the frame, where it is still at its first."""
+        return replace(state, frame=self.frame) if state.frame == 0 else state
+
+
+@dataclass(frozen=True)
 class CompareWith:
     """The render from other poses shall show beside that of the poses that are shown."""
 
