@@ -32,6 +32,7 @@ from gazeloc_app.job_list import JobList
 from gazeloc_app.jobs import JobRunner
 from gazeloc_app.live_alignment import LiveAlignment
 from gazeloc_app.looks import Look
+from gazeloc_app.loupe import add_loupe_route
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.camera_colors import CameraColors
 from gazeloc_app.panels.export import ExportPanel
@@ -43,6 +44,7 @@ from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
 from gazeloc_app.panels.layers import LayerPanel
+from gazeloc_app.panels.loupe import LoupePanel
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.problems import ProblemPanel
 from gazeloc_app.panels.project import ProjectPanel
@@ -187,6 +189,7 @@ class App:
             job_logs = JobLogs(gui, str(self.project.folder / "logs"))
         with tabs.add_tab("Keypoints"):
             keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
+            loupe_panel = LoupePanel(gui, self.data)
             ghost = SuggestionLayer(self.server.scene)
             suggestion_panel = SuggestionPanel(gui, Proposals(self.data), dispatch, self._go_to, ghost.show)
             keypoint_files = KeypointFiles(gui, state, dispatch)
@@ -211,7 +214,7 @@ class App:
             self._help = HelpPanel(gui, self._toggle_look)
         side.dock_left()
         side.set_width(430)
-        work = (project_panel, keypoint_panel, keypoint_files, suggestion_panel, alignment_panel)
+        work = (project_panel, keypoint_panel, loupe_panel, keypoint_files, suggestion_panel, alignment_panel)
         looks = (
             method_panel,
             figure_panel,
@@ -234,6 +237,7 @@ class App:
         pictures = Pictures(self.data, self._render, lambda: self.store.state)
         add_picture_routes(routes, pictures.frame, pictures.render, pictures.thumbnail)
         add_show_route(routes, self.data, lambda: self.store.state, self.store.dispatch)
+        add_loupe_route(routes, self.data, self._render)
         return routes
 
     def _warm_up(self) -> None:

@@ -11,11 +11,14 @@ import viser
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.actions.picks import MovePoint
 from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.facing import place_to_stand
 from gazeloc_app.looking import Looking
+from gazeloc_app.moving import nudged
 from gazeloc_app.panels.looking import LookingControls
+from gazeloc_app.panels.nudging import add_nudges
 from gazeloc_app.picking import ClickFilter
 from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.scene_view import SceneView
@@ -48,7 +51,8 @@ class Browser:
         self._controls = LookingControls(client, data, self.looking, state, dispatch)
         cut = Cut(client, *room_corners(data.scan().mesh), data.scan().up_axis)
         moves = lambda: bool(self._move.value)  # noqa: E731
-        bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut)
+        snaps = lambda: bool(self._snap.value)  # noqa: E731
+        bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut, snaps)
         self._tools = tools_of(bench)
         self._in_hand = self.tool
         for modifier in (None, SHIFT):
@@ -85,6 +89,16 @@ class Browser:
             self._client.camera.position = eye
             self._client.camera.look_at = np.array(in_scan)
 
+    def _nudge(self, screen: tuple[int, int], step_m: float) -> None:
+        state = self._state()
+        pair = state.annotation.keypoints.get(state.selected_key) if state.selected_key else None
+        if pair is None or pair.scan is None:
+            self._dispatch(Notify(Level.INFO, "Select a keypoint with a place on the scan; arrows move that."))
+            return
+        camera_wxyz = np.asarray(self._client.camera.wxyz)
+        point = nudged(self._data.raycaster(), pair.scan, step_m, screen, camera_wxyz)
+        self._dispatch(MovePoint(pair.key, point))
+
     def render(self, state: AppState) -> None:
         """Follow the frame slider while looking through a camera of the recording; show the keypoints in it."""
         self.looking.follow(state)
@@ -99,6 +113,8 @@ class Browser:
             hint=f"In this browser only; the key P goes on. Dragging always orbits. {hints}",
         )
         self._move = gui.add_checkbox("Move point", False, hint="The click moves the selected pair's point.")
+        self._snap = gui.add_checkbox("Snap to tags", True, hint="A click near a tag's centre or corner means that.")
+        add_nudges(gui, self._nudge)
         widgets.on_user(self._choice, lambda _: self._take())
         toggle = gui.add_command("Next tool", hotkey="P", description="What a click does")
         widgets.on_user(toggle, lambda _: self._next_tool(), event="on_trigger")

@@ -13,6 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
+from gazeloc_app.dragging import Dragging
 from gazeloc_app.gaze_at import gaze_in_scan
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
@@ -73,7 +74,7 @@ class SceneView:
         self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
         self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
         self.cameras = SceneCameras(scene, data)
-        self._keypoints = KeypointsLayer(scene)
+        self._keypoints = KeypointsLayer(scene, on_drag=Dragging(data, lambda: self.front, dispatch))
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
 

@@ -59,3 +59,29 @@ def test_one_spot_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page):
     assert np.linalg.norm(np.array(page.pairs[0].scan) - SPOT) < 0.02
     page.press("Leave the frame")
     page.viewer.wait_for_node("/picture", present=False).wait_for_node("/picture-marks/lines", present=False)
+
+
+def test_a_marker_is_dragged_along_the_wall_and_nudged_by_an_arrow(page):
+    page.viewer.click_at_point(WALL, modifiers=("Shift",))
+    page.until(lambda: len(page.pairs) == 1)
+    page.viewer.wait_for_node("/keypoints/k1/scan")
+    before = np.array(page.pairs[0].scan)
+    start, end = page.viewer.project([before, before + np.array([0.4, 0.0, -0.2])])
+    mouse = page.page.mouse
+    mouse.move(*start)
+    page.page.wait_for_timeout(300)
+    mouse.down()
+    mouse.move(*((start + end) / 2), steps=4)
+    mouse.move(*end, steps=4)
+    page.page.wait_for_timeout(200)
+    mouse.up()
+    page.until(lambda: page.pairs[0].scan != tuple(before.tolist()))
+    moved = np.array(page.pairs[0].scan)
+    assert abs(moved[1]) < 0.01  # still on the wall
+    assert np.linalg.norm(moved - before - (0.4, 0.0, -0.2)) < 0.03
+    page.page.keyboard.press("ArrowUp")
+    page.until(lambda: page.pairs[0].scan != tuple(moved.tolist()))
+    assert np.linalg.norm(np.array(page.pairs[0].scan) - moved) == pytest.approx(0.002, abs=1e-4)
+    page.viewer.save("app-nudged")
+    passive = "Unable to preventDefault inside passive event listener"  # viser's own, at every drag of a node
+    page.viewer.errors[:] = [error for error in page.viewer.errors if passive not in error]

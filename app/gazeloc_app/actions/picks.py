@@ -41,6 +41,8 @@ class PickPoint:
     side: Side
     point: Point
     move: bool = False
+    name: str = ""
+    """What was hit, where that is known (a tag's corner): names a pair that nobody has named yet."""
 
     def apply(self, state: AppState) -> AppState:
         """The state with the point placed and its pair selected."""
@@ -48,10 +50,28 @@ class PickPoint:
         selected = keypoints.get(state.selected_key) if state.selected_key else None
         fields = self.side.fields(self.point, (), None)
         if selected is not None and (self.move or self.side.point_of(selected) is None):
+            if self.name and selected.name == _first_name(selected.key):
+                fields["name"] = self.name
             return state.with_keypoints(keypoints.change(selected.key, **fields))
         key = keypoints.next_key()
-        pair = KeypointPair(key, f"Keypoint {key[1:]}", **fields)
+        pair = KeypointPair(key, self.name or _first_name(key), **fields)
         return replace(state.with_keypoints(keypoints.add(pair)), selected_key=key)
+
+
+@dataclass(frozen=True)
+class MovePoint:
+    """A pair's place on the scan was dragged or nudged; clicks in the phone's frames no longer say where it is."""
+
+    key: str
+    point: Point
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the place, the pair selected; unchanged where the pair is gone or has no such place."""
+        pair = state.annotation.keypoints.get(self.key)
+        if pair is None or pair.scan is None:
+            return state
+        moved = state.annotation.keypoints.change(self.key, **Side.SCAN.fields(self.point, (), None))
+        return replace(state.with_keypoints(moved), selected_key=self.key)
 
 
 @dataclass(frozen=True)
@@ -75,7 +95,11 @@ class PickSighting:
         if pair is None:
             key = keypoints.next_key()
             fields = self.side.fields(None, (self.sighting,), None)
-            pair = KeypointPair(key, f"Keypoint {key[1:]}", **fields)
+            pair = KeypointPair(key, _first_name(key), **fields)
             return replace(state.with_keypoints(keypoints.add(pair)), selected_key=key)
         sightings = add_sighting(self.side.sightings_of(pair), self.sighting)
         return state.with_keypoints(keypoints.change(pair.key, **self.side.fields(self.point, sightings, self.sigma)))
+
+
+def _first_name(key: str) -> str:
+    return f"Keypoint {key[1:]}"

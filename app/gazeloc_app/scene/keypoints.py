@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -38,11 +40,16 @@ class _Residual:
     color: Rgb
 
 
+OnDrag = Callable[[str, Any], None]
+
+
 class KeypointsLayer:
     """Markers at `/keypoints/<key>/scan` and `/sfm`, the name as a label, and a line between a pair's two sides."""
 
-    def __init__(self, scene: viser.SceneApi, radius_m: float = 0.025):
+    def __init__(self, scene: viser.SceneApi, radius_m: float = 0.025, on_drag: OnDrag | None = None):
+        """`on_drag(key, event)` hears of drags of the markers on the scan's side, in order."""
         self._scene = scene
+        self._on_drag = on_drag
         self._radius_m = radius_m
         self._markers: NodeGroup[_Marker] = NodeGroup(self._make_marker)
         self._labels: NodeGroup[_Label] = NodeGroup(self._make_label)
@@ -77,7 +84,7 @@ class KeypointsLayer:
             group.set_visible(visible)
 
     def _make_marker(self, name: str, marker: _Marker) -> viser.IcosphereHandle:
-        return self._scene.add_icosphere(
+        handle = self._scene.add_icosphere(
             name,
             radius=marker.radius_m,
             color=marker.color,
@@ -86,6 +93,17 @@ class KeypointsLayer:
             cast_shadow=False,
             receive_shadow=False,
         )
+        if self._on_drag is not None and name.endswith("/scan"):
+            self._hear_drags(handle, name.split("/")[2], self._on_drag)
+        return handle
+
+    @staticmethod
+    def _hear_drags(handle: viser.IcosphereHandle, key: str, on_drag: OnDrag) -> None:
+        async def dragged(event: Any) -> None:
+            on_drag(key, event)
+
+        handler: Any = dragged  # viser takes coroutines too, which its annotation does not say
+        handle.on_drag("left")(handler)
 
     def _make_label(self, name: str, label: _Label) -> viser.LabelHandle:
         return self._scene.add_label(name, label.text, position=np.array(label.position), anchor="bottom-left")

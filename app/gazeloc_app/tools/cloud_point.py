@@ -22,6 +22,9 @@ class CloudPointTool(Tool):
         model, scan_from_sfm = self.bench.data.model(state.recording), shown_scan_from_sfm(self.bench.data, state)
         if model is None or scan_from_sfm is None:
             return Notify(Level.WARNING, "There is no reconstruction yet; run the stages first.")
+        tag = self.bench.snapped(click, self.bench.data.sfm_tags(state.recording), scan_from_sfm, None)
+        if tag is not None:
+            return PickPoint(Side.SFM, as_point(tag.point), move=self.bench.moves(), name=tag.name)
         points_in_scan = scan_from_sfm.apply(model.points)
         found = picking.pick_cloud(points_in_scan, click.origin, click.direction, self.bench.tolerance_rad())
         if found is None:

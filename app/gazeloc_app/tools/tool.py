@@ -20,9 +20,12 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.looking import Looking
+from gazeloc_app.snapping import NEAR_PX, Snapped, snap
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats, frozen
 from gazeloc_core.keypoints import Point
+from gazeloc_core.tag_types import TagCorners
+from gazeloc_core.transforms import Similarity
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class Bench:
     """What the tools of one browser work with.
 
     `front()` says which side of the scan's faces is drawn (see `picking.pick_mesh`); `moves()` whether a click shall
-    move the selected keypoint's point.
+    move the selected keypoint's point, `snaps()` whether one near a tag's centre or corner means that.
     """
 
     client: viser.ClientHandle
@@ -59,11 +62,21 @@ class Bench:
     front: Callable[[], int]
     moves: Callable[[], bool]
     cut: Cut
+    snaps: Callable[[], bool] = lambda: True
 
     def tolerance_rad(self) -> float:
         """The angle within which a click in this browser's view means a thing."""
         height = max(int(self.client.camera.image_height), 1)
         return picking.tolerance_rad(float(self.client.camera.fov), height)
+
+    def snapped(
+        self, click: Click, tags: TagCorners | None, scan_from_tags: Similarity, hit_in_scan: Floats | None
+    ) -> Snapped | None:
+        """The tag's place that a click means; None where it means none, or snapping is off."""
+        if not self.snaps():
+            return None
+        tolerance = self.tolerance_rad() * NEAR_PX / picking.CLICK_RADIUS_PX
+        return snap(tags, scan_from_tags, click.origin, click.direction, tolerance, hit_in_scan)
 
     def point_on_scan(self, click: Click) -> Point | None:
         """Where a click meets the scan, in metres; None beside it."""

@@ -1,0 +1,96 @@
+"""The loupe: the scan around a place, enlarged, drawn by the drawing process and reached by a URL of our own.
+
+`/loupe.jpg?at=x,y,z&from=x,y,z`: numbers of the page, so checked like all of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+from urllib.parse import quote
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from gazeloc_app.data import ProjectData
+from gazeloc_app.facing import place_to_stand
+from gazeloc_app.render_process import RenderProcess
+from gazeloc_app.render_worker import Frame, Render, camera_text
+from gazeloc_app.routes import Asked, Reply, Routes
+from gazeloc_app.state import AppState
+from gazeloc_core.arrays import Floats
+from gazeloc_core.camera import Camera
+from gazeloc_core.errors import InputError
+from gazeloc_core.keypoints import Point
+from gazeloc_core.transforms import wxyz_of
+from gazeloc_core.viewpoint import up_vector
+
+SIZE_PX = 320
+ACROSS_M = 0.25
+"""What the loupe shows from edge to edge: a centimetre is 13 pixels."""
+FRAME_PX = 900
+"""Width of a frame of which a part is shown; several frames are shown at once, so none pushes another aside."""
+FARTHEST = 1e4
+_KEPT_S = 300
+
+
+def loupe_url(data: ProjectData, state: AppState, in_scan: Point) -> str:
+    """The URL of the scan around a place, seen from where a camera that had it in view stood."""
+    eye = place_to_stand(data, state, in_scan)
+    at, start = (",".join(f"{float(value):.4f}" for value in point) for point in (in_scan, eye))
+    return f"/loupe.jpg?at={quote(at)}&from={quote(start)}&rev={state.data_revision}"
+
+
+def add_loupe_route(routes: Routes, data: ProjectData, process: RenderProcess) -> None:
+    """Answer `loupe_url`, of several that wait only the newest; and `/loupe/<recording>/<index>.jpg`, every one."""
+
+    async def answer(asked: Asked) -> Reply:
+        place, eye = (_place(asked.query.get(name, "")) for name in ("at", "from"))
+        if np.linalg.norm(place - eye) < 0.01:
+            raise InputError("The loupe stands on the place that it shows.")
+        job = _job(place, eye, up_vector(data.scan().up_axis))
+        body = bytes(await asyncio.wrap_future(process.submit(job, key="loupe")))
+        return Reply(body=body, content_type="image/jpeg", cache_s=_KEPT_S)
+
+    async def answer_frame(asked: Asked) -> Reply:
+        index = asked.names["index"]
+        if not re.fullmatch(r"[0-9]{1,9}", index):
+            raise InputError(f"{index[:20]!r} is not a frame's number.")
+        job = Frame(recording=asked.names["recording"], index=int(index), width=FRAME_PX)
+        body = bytes(await asyncio.wrap_future(process.submit(job, key=f"loupe {job}")))
+        return Reply(body=body, content_type="image/jpeg", cache_s=_KEPT_S)
+
+    routes.get("/loupe.jpg", answer)
+    routes.get("/loupe/{recording}/{index}.jpg", answer_frame)
+
+
+def _job(place: Floats, eye: Floats, up: Floats) -> Render:
+    pose = pose_facing(eye, place, up)
+    focal_px = SIZE_PX * float(np.linalg.norm(place - eye)) / ACROSS_M
+    camera = Camera.pinhole(SIZE_PX, SIZE_PX, focal_px, focal_px, SIZE_PX / 2, SIZE_PX / 2)
+    w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
+    cx, cy, cz = (float(value) for value in eye)
+    return Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz))
+
+
+def pose_facing(eye: Floats, place: Floats, up: Floats) -> RigidTransform:
+    """`scan_from_camera` at the eye, the place in its middle, upright where that can be."""
+    forward = (place - eye) / np.linalg.norm(place - eye)
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) < 1e-6:
+        right = np.cross(forward, np.eye(3)[int(np.abs(forward).argmin())])
+    right = right / np.linalg.norm(right)
+    axes = np.stack([right, np.cross(forward, right), forward], axis=1)
+    return RigidTransform.from_components(eye, Rotation.from_matrix(axes))
+
+
+def _place(text: str) -> Floats:
+    parts = text.split(",") if len(text) <= 120 else []
+    try:
+        values = [float(part) for part in parts]
+    except ValueError:
+        values = []
+    if len(values) != 3 or not all(math.isfinite(value) and abs(value) <= FARTHEST for value in values):
+        raise InputError(f"{text[:40]!r} is no place; the loupe needs three numbers.")
+    return np.array(values)

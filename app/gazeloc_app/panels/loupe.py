@@ -1,0 +1,100 @@
+"""Part of the panel of keypoints: the selected one under a loupe, on the scan and in frames that see it.
+
+The frames are enlarged by CSS, from pictures that the page mostly has already.
+"""
+
+from __future__ import annotations
+
+import secrets
+from urllib.parse import quote
+
+import numpy as np
+from viser import GuiApi
+
+from gazeloc_app import widgets
+from gazeloc_app.actions.picks import Side
+from gazeloc_app.data import ProjectData
+from gazeloc_app.frame_marks import Mark, marks_in_frame
+from gazeloc_app.loupe import ACROSS_M, loupe_url
+from gazeloc_app.state import AppState
+from gazeloc_core.camera import Camera
+from gazeloc_core.keypoints import KeypointPair
+
+MOST_FRAMES = 2
+"""Frames beside the scan; the ones that were clicked come first."""
+ENLARGED = 4.0
+"""How many times larger than to fit its box a frame is shown."""
+BOX_PX = 118
+
+
+class LoupePanel:
+    """Boxes side by side with a crosshair each; empty while no keypoint is selected."""
+
+    def __init__(self, gui: GuiApi, data: ProjectData):
+        self._data = data
+        self._seen: object = None
+        self._revision = secrets.token_hex(4)  # the frames of this session; the browser may keep them
+        self._html = gui.add_html("")
+
+    def render(self, state: AppState) -> None:
+        """Show the selected keypoint."""
+        pair = state.annotation.keypoints.get(state.selected_key) if state.selected_key else None
+        seen = (pair, state.recording, state.annotation.alignment, state.data_revision)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        boxes = [] if pair is None else self._boxes(state, pair)
+        content = f'<div class="gazeloc-loupe" style="display:flex;gap:6px">{"".join(boxes)}</div>' if boxes else ""
+        widgets.set_content(self._html, widgets.box(content) if content else "")
+
+    def _boxes(self, state: AppState, pair: KeypointPair) -> list[str]:
+        boxes = []
+        if pair.scan is not None:
+            style = f"background:#222 url('{loupe_url(self._data, state, pair.scan)}') center/100% 100%"
+            boxes.append(_box(style, f"scan, {100 * ACROSS_M:.0f} cm across"))
+        camera = self._data.camera(state.recording)
+        if camera is not None:
+            marks = self._marks(state, pair)[: MOST_FRAMES + (pair.scan is None)]
+            boxes += [self._frame_box(state.recording, frame, mark, camera) for frame, mark in marks]
+        return boxes
+
+    def _marks(self, state: AppState, pair: KeypointPair) -> list[tuple[int, Mark]]:
+        """Frames of the reconstruction with the pair in them, the clicked ones first, then where it is most central."""
+        model, camera = self._data.model(state.recording), self._data.camera(state.recording)
+        if model is None or camera is None:
+            return []
+        found: list[tuple[int, Mark]] = []
+        for frame in _spread([int(frame) for frame in model.frame_indices if frame >= 0]):
+            marks, _ = marks_in_frame(self._data, state, Side.SFM, frame)
+            found += [(frame, mark) for mark in marks if mark.key == pair.key]
+        middle = np.array([camera.width, camera.height]) / 2
+        return sorted(
+            found, key=lambda item: (not item[1].is_clicked, np.hypot(*(middle - (item[1].x_px, item[1].y_px))))
+        )
+
+    def _frame_box(self, recording: str, frame: int, mark: Mark, camera: Camera) -> str:
+        url = f"/loupe/{quote(recording)}/{frame}.jpg?rev={self._revision}"
+        wide, high = ENLARGED * BOX_PX, ENLARGED * BOX_PX * camera.height / camera.width
+        left, top = BOX_PX / 2 - wide * mark.x_px / camera.width, BOX_PX / 2 - high * mark.y_px / camera.height
+        style = f"background:#222 url('{url}') {left:.1f}px {top:.1f}px/{wide:.1f}px {high:.1f}px no-repeat"
+        return _box(style, f"frame {frame}, {'clicked' if mark.is_clicked else 'expected'}")
+
+
+def _spread(frames: list[int], most: int = 24) -> list[int]:
+    """At most so many of the frames, evenly: which of two neighbours is shown does not matter."""
+    return frames[:: max(1, -(-len(frames) // most))]
+
+
+def _box(style: str, caption: str) -> str:
+    lines = "position:absolute;background:#ff00c8;mix-blend-mode:normal;opacity:.85"
+    cross = (
+        f'<i style="{lines};left:50%;top:30%;width:1px;height:15%"></i>'
+        f'<i style="{lines};left:50%;top:55%;width:1px;height:15%"></i>'
+        f'<i style="{lines};top:50%;left:30%;height:1px;width:15%"></i>'
+        f'<i style="{lines};top:50%;left:55%;height:1px;width:15%"></i>'
+    )
+    return (
+        f'<figure style="margin:0;width:{BOX_PX}px"><div style="position:relative;width:{BOX_PX}px;height:{BOX_PX}px;'
+        f'border-radius:4px;overflow:hidden;{style}">{cross}</div>'
+        f'<figcaption style="font-size:11px;opacity:.75">{widgets.text(caption)}</figcaption></figure>'
+    )
