@@ -28,12 +28,13 @@ class Pictures:
 
     All browsers show the frame of the state. So a picture of that frame may push aside the others that wait, but a
     slow browser's late request for an earlier frame may not push aside that one; and browsers that ask for the same
-    picture share it.
+    picture share it. Small pictures for lists, and neighbours that a page fetches while it is idle, are drawn while
+    nothing else is to be drawn.
     """
 
     def __init__(self, data: ProjectData, process: RenderProcess, state: Callable[[], AppState]):
         self._data, self._process, self._state = data, process, state
-        self._asked: dict[Frame | Render, Future[Any]] = {}
+        self._asked: dict[tuple[Frame | Render, str], Future[Any]] = {}
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """A frame as JPEG, undistorted; with `tags=1` the tags in it are drawn, with `lens=1` it is as recorded."""
@@ -46,7 +47,7 @@ class Pictures:
         """A frame as a small JPEG for lists; every one that is asked for is made, after what people look at."""
         del query
         job = Frame(recording=recording, index=index, width=THUMBNAIL_PX, as_recorded=True)
-        return bytes(await self._process.request(job))
+        return bytes(await asyncio.wrap_future(self._process.submit(job, is_later=True)))
 
     async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG.
@@ -74,9 +75,9 @@ class Pictures:
     async def _picture(self, kind: str, recording: str, index: int, job: Frame | Render) -> bytes:
         state = self._state()
         when = "now" if (recording, index) == (state.recording, state.frame) else "before"
-        waiting = self._asked.get(job)
+        waiting = self._asked.get((job, when))
         if waiting is None or waiting.done():
-            self._asked = {other: future for other, future in self._asked.items() if not future.done()}
-            waiting = self._process.submit(job, key=f"{kind} {when}")
-            self._asked[job] = waiting
+            self._asked = {asked: future for asked, future in self._asked.items() if not future.done()}
+            waiting = self._process.submit(job, key=f"{kind} {when}", is_later=when == "before")
+            self._asked[job, when] = waiting
         return bytes(await asyncio.wrap_future(waiting))

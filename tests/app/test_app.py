@@ -367,3 +367,28 @@ def test_browsers_that_ask_for_the_shown_frame_share_it_and_late_ones_do_not_pus
     assert answers[:3] == [b"0", b"6", b"6"]
     assert isinstance(answers[3], Superseded)
     assert asked == [0, 6, 4]
+
+
+def test_small_pictures_for_lists_come_after_the_frame_that_is_shown(app, monkeypatch):
+    gate, asked = threading.Event(), []
+
+    def slowly(self, job):
+        gate.wait(10)
+        asked.append(job.index)
+        return b""
+
+    monkeypatch.setattr(RenderProcess, "_answer", slowly)
+    process = RenderProcess(None)
+    pictures = Pictures(app.data, process, lambda: app.store.state)
+
+    async def browse():
+        small = [asyncio.create_task(pictures.thumbnail("walk", index, {})) for index in (5, 7, 9)]
+        await asyncio.sleep(0.05)
+        shown = asyncio.create_task(pictures.frame("walk", app.store.state.frame, {}))
+        await asyncio.sleep(0.05)
+        gate.set()
+        await asyncio.gather(shown, *small)
+
+    asyncio.run(browse())
+    process.close()
+    assert asked == [5, app.store.state.frame, 7, 9]
