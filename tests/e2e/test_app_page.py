@@ -258,7 +258,7 @@ def test_the_slider_changes_frame_and_render_and_blend_and_wipe_are_the_pages_ow
 
 _DIFFERENCE = """
 async () => {
-  const images = [...document.querySelectorAll('.gazeloc-comparison img')].slice(0, 2);
+  const images = [...document.querySelectorAll('.gazeloc-stage img')].slice(0, 2);
   await Promise.all(images.map(i => i.decode()));
   const data = images.map(i => {
     const c = new OffscreenCanvas(200, 180), x = c.getContext('2d');
