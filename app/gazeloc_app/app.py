@@ -40,6 +40,7 @@ from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.first_steps import FirstSteps
 from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.panels.help import HelpPanel
+from gazeloc_app.panels.history import HistoryPanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
@@ -64,6 +65,8 @@ from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_app.suggestions import Proposals
 from gazeloc_app.view_saving import ViewSaver
+from gazeloc_app.view_memory import ViewMemory
+from gazeloc_app.visitors import Visitors
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.keypoints import Point
@@ -114,6 +117,7 @@ class App:
             self.live = LiveAlignment(self.data, self.store.dispatch)
             self.store.dispatch(OfferJobs(self._job_list.read()))
             self.jobs = JobRunner(project.folder, self.store.dispatch)
+            self._visitors = Visitors(ViewMemory(project.folder), self.store.dispatch)
             self._render = RenderProcess(_sources(project), self._say_trouble)
             undo.callback(self._render.close)
             self.server = make_server(
@@ -133,6 +137,7 @@ class App:
         self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
         self._build_panels()
         self.store.add_view(self._render_browsers)
+        self.store.add_view(self._visitors.render)
         self.store.add_saver(self._saver.commit)
         self.store.add_saver(self._job_list.save)
         self.store.add_saver(self._views.save)
@@ -152,6 +157,7 @@ class App:
         self.store.start()
         self.live.start()
         self._player.start()
+        self._visitors.start()
         threading.Thread(target=self._warm_up, name="gazeloc-warm-up", daemon=True).start()
         colors = pipeline.stage_named("colors", of_scan=True)
         if colors.is_needed(self.project) and not colors.artifact(self.project, "").exists:
@@ -161,6 +167,7 @@ class App:
         """End the loop, the worker processes and the server, and let others write to the project."""
         self.live.stop()
         self._player.stop()
+        self._visitors.stop()
         self.store.stop()
         self.jobs.stop()
         self._render.close()
@@ -195,6 +202,8 @@ class App:
             keypoint_files = KeypointFiles(gui, state, dispatch)
         with tabs.add_tab("Align"):
             alignment_panel = AlignmentPanel(gui, self.data, dispatch)
+        with tabs.add_tab("History"):
+            history_panel = HistoryPanel(gui, dispatch)
         with tabs.add_tab("Methods"):
             method_panel = MethodPanel(gui, self.data, dispatch)
         with tabs.add_tab("Figures"):
@@ -225,7 +234,7 @@ class App:
             frame_panel,
             problem_panel,
         )
-        for panel in (job_bar, self._first_steps, job_logs, *work, *looks):
+        for panel in (job_bar, self._first_steps, job_logs, history_panel, *work, *looks):
             self.store.add_view(panel.render)
 
     def _usual_views(self) -> dict[str, SavedView]:
@@ -234,6 +243,7 @@ class App:
     def _routes(self) -> Routes:
         routes = Routes()
         add_static_route(routes)
+        self._visitors.add_routes(routes)
         pictures = Pictures(self.data, self._render, lambda: self.store.state)
         add_picture_routes(routes, pictures.frame, pictures.render, pictures.thumbnail)
         add_show_route(routes, self.data, lambda: self.store.state, self.store.dispatch)
@@ -261,10 +271,12 @@ class App:
         self._looks[client.client_id] = look = Look(client)
         self._help.show((self.server.gui, client.gui))
         look.remember()
+        self._visitors.come(client, browser, self.store.state)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._browsers.pop(client.client_id, None)
         self._looks.pop(client.client_id, None)
+        self._visitors.go(client)
 
     def _render_browsers(self, state: AppState) -> None:
         for browser in list(self._browsers.values()):

@@ -1,4 +1,4 @@
-"""What belongs to one browser: its tool, its clicks, and the camera it looks through. A reload forgets it."""
+"""What belongs to one browser: its tool, its clicks, and the camera it looks through (see visitors.py for reloads)."""
 
 from __future__ import annotations
 
@@ -98,6 +98,17 @@ class Browser:
         camera_wxyz = np.asarray(self._client.camera.wxyz)
         point = nudged(self._data.raycaster(), pair.scan, step_m, screen, camera_wxyz)
         self._dispatch(MovePoint(pair.key, point))
+
+    def take_again(self, tool: str) -> None:
+        """Take the tool that this browser had in hand before a reload, where there is one of that name."""
+        if tool in self._tools:
+            self._choice.value = tool
+            self._take()
+
+    def look_again(self, recording: str | None, frame: int) -> None:
+        """Look through the frame that this browser looked through before a reload, where there still is one."""
+        self.looking.look_again(recording, frame)
+        self._show_leave()
 
     def render(self, state: AppState) -> None:
         """Follow the frame slider while looking through a camera of the recording; show the keypoints in it."""

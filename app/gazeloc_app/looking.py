@@ -66,6 +66,14 @@ class Looking:
         job = Photo(path=str(photo.image_path), camera=camera_text(photo.camera))
         self._look_from(Target(None, frame), photo.scan_from_camera, photo.camera, job)
 
+    def look_again(self, recording: str | None, frame: int) -> None:
+        """Look through a frame as before a reload; what is no longer there, or not the slider's frame, is left out."""
+        state = self._state()
+        if recording is None and 0 <= frame < len(self._data.scan().frames_with_images):
+            self.look_with_phone(frame)
+        elif (recording, frame) == (state.recording, state.frame):
+            self.look(frame)
+
     def leave(self) -> None:
         """Take the frame's picture away; the camera stays."""
         self.target = None

@@ -92,6 +92,20 @@ class EndedJob:
 
 
 @dataclass(frozen=True)
+class Person:
+    """Somebody whose page is open; `number` is the lowest that was free and gives the colour."""
+
+    client_id: int
+    number: int
+    name: str = ""
+
+    @property
+    def title(self) -> str:
+        """The name, or what stands in for it."""
+        return self.name or f"Person {self.number}"
+
+
+@dataclass(frozen=True)
 class Annotation:
     """What people decide, and what undo and redo step through."""
 
@@ -175,6 +189,8 @@ class AppState:
     offered_jobs: tuple[Job, ...] = ()
     """What was under way when GazeLoc ended the last time; begun only when somebody says so."""
     jobs_started: int = 0
+    people: tuple[Person, ...] = ()
+    """Who is here, by number."""
     notice: Notice | None = None
     data_revision: int = 0
     """Counts up whenever a stage finished, so that views read its artifacts anew."""

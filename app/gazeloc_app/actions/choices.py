@@ -69,4 +69,5 @@ class OpenRecording:
             ended_jobs=state.ended_jobs,
             offered_jobs=state.offered_jobs,
             jobs_started=state.jobs_started,
+            people=state.people,
         )

@@ -1,4 +1,4 @@
-"""Undo and redo over everything that people decide."""
+"""Undo, redo and going to any step, over everything that people decide."""
 
 from __future__ import annotations
 
@@ -41,6 +41,22 @@ class Redo:
                 future=state.future[1:],
             )
         )
+
+
+@dataclass(frozen=True)
+class GoToStep:
+    """A step in the visible list of `count` steps was chosen; 0 is the beginning."""
+
+    step: int
+    count: int
+
+    def apply(self, state: AppState) -> AppState:
+        """The state as it was after that step; all others stay in the list."""
+        steps = (*state.past, state.annotation, *state.future)
+        if self.count != len(steps) or not 0 <= self.step < len(steps):
+            return state.noticed(Level.INFO, "The list of steps has changed meanwhile; choose again.")
+        present, past, future = steps[self.step], steps[: self.step], steps[self.step + 1 :]
+        return _with_selection_kept(replace(state, annotation=present, past=past, future=future))
 
 
 def _with_selection_kept(state: AppState) -> AppState:

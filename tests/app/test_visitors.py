@@ -1,0 +1,226 @@
+"""Pages by their tabs: each comes back to its own view, is named for the others, and only its secret speaks for it."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import re
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import numpy as np
+import pytest
+from gazeloc_app.actions.choices import ChooseAlignment
+from gazeloc_app.actions.history import GoToStep, Undo
+from gazeloc_app.actions.jobs import CancelJob
+from gazeloc_app.actions.people import MAX_NAME, PersonCame, PersonLeft
+from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.looking import Target
+from gazeloc_app.panels.history import MAX_SHOWN, HistoryPanel
+from gazeloc_app.panels.people import PeopleBar
+from gazeloc_app.routes import Routes
+from gazeloc_app.state import AppState
+from gazeloc_app.view_memory import MAX_BROWSERS, View, ViewMemory
+from gazeloc_app.visitors import Visitors
+
+TAB, OTHER = "a" * 24, "b" * 24
+VIEW = View((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.9, "orbits")
+
+
+class Client:
+    """A connection as far as visitors look at it; takes note of the HTML that its page was given."""
+
+    def __init__(self, number: int):
+        self.client_id = number
+        self.camera = SimpleNamespace(
+            position=np.zeros(3), look_at=np.ones(3), up_direction=np.array([0.0, 0, 1]), fov=1.0
+        )
+        self.gui = MagicMock()
+        self.gui.add_html.side_effect = lambda content, **_: SimpleNamespace(content=content)
+        self.atomic = MagicMock()
+
+    @property
+    def secret(self) -> str:
+        (content,) = (call.args[0] for call in self.gui.add_html.call_args_list if "hello" in call.args[0])
+        return re.search(r"hello\('([\w-]+)'", content)[1]
+
+
+def browser():
+    made = MagicMock()
+    made.tool.name, made.looking.target = "a tool", None
+    return made
+
+
+class Place:
+    """Visitors with their routes and the state that their actions make."""
+
+    def __init__(self, folder):
+        self.state, self.actions = AppState(("walk",), "walk"), []
+        self.memory = ViewMemory(folder)
+        self.visitors, self.routes = Visitors(self.memory, self.dispatch), Routes()
+        self.visitors.add_routes(self.routes)
+        self.number = 0
+
+    def dispatch(self, action):
+        self.actions.append(action)
+        self.state = action.apply(self.state)
+
+    def come(self, tab=None, name=""):
+        self.number += 1
+        client, one = Client(self.number), browser()
+        self.visitors.come(client, one, self.state)
+        if tab is not None:
+            assert self.ask(client.secret, f"hello?tab={tab}&name={name}") == (200, "here")
+        return client, one
+
+    def ask(self, secret, what):
+        reply = asyncio.run(self.routes.answer(f"/session/{secret}/{what}"))
+        return reply.status, reply.body.decode()
+
+
+@pytest.fixture
+def place(tmp_path):
+    return Place(tmp_path)
+
+
+def test_a_reload_comes_back_to_camera_tool_and_frame(place):
+    client, one = place.come(TAB)
+    client.camera.position, client.camera.fov = np.array([4.0, 5, 6]), 0.7
+    one.tool.name, one.looking.target = "sets a point", Target("walk", 7)
+    place.visitors.go(client)
+    client, one = place.come(TAB)
+    assert tuple(client.camera.position) == (4, 5, 6)
+    assert client.camera.fov == 0.7
+    one.take_again.assert_called_once_with("sets a point")
+    one.look_again.assert_called_once_with("walk", 7)
+    _, stranger = place.come(OTHER)
+    stranger.take_again.assert_not_called()
+
+
+def test_a_connection_whose_loss_is_not_known_yet_gives_its_view_to_the_next(place):
+    lost, _ = place.come(TAB)
+    lost.camera.position = np.array([4.0, 5, 6])
+    again, _ = place.come(TAB)
+    assert tuple(again.camera.position) == (4, 5, 6)
+    again.camera.position = np.array([7.0, 8, 9])
+    place.visitors.go(again)
+    place.visitors.go(lost)  # its old view must not replace the newer one
+    assert place.memory.get(TAB).position == (7, 8, 9)
+
+
+def test_views_survive_a_restart_and_a_damaged_file_harms_nothing(place, tmp_path):
+    client, _ = place.come(TAB)
+    client.camera.position = np.array([4.0, 5, 6])
+    place.visitors.stop()
+    assert Place(tmp_path).memory.get(TAB).position == (4, 5, 6)
+    for text in ("{", "[]", '{"x": {"position": [1, 2]}}', '{"x": 3}'):
+        (tmp_path / ".views.json").write_text(text)
+        assert Place(tmp_path).memory.get(TAB) is None
+
+
+def test_a_camera_that_is_nonsense_is_not_remembered(place):
+    client, _ = place.come(TAB)
+    client.camera.position = np.array([np.nan, 0, 0])
+    place.visitors.go(client)
+    assert place.memory.get(TAB) is None
+
+
+def test_only_so_many_browsers_are_remembered(tmp_path):
+    memory = ViewMemory(tmp_path)
+    for number in range(MAX_BROWSERS + 3):
+        memory.put(f"{number:024d}", VIEW)
+    assert memory.get(f"{2:024d}") is None
+    assert memory.get(f"{3:024d}") == VIEW
+
+
+def test_people_are_counted_named_and_gone(place):
+    first, _ = place.come(TAB, "Anna")
+    place.come(OTHER)
+    assert [person.title for person in place.state.people] == ["Anna", "Person 2"]
+    place.ask(first.secret, "name?name=%20Anna%20%20B.%20" + "x" * 100)
+    assert place.state.people[0].name == ("Anna B. " + "x" * 100)[:MAX_NAME]
+    place.visitors.go(first)
+    assert [person.title for person in place.state.people] == ["Person 2"]
+    place.come()
+    assert [person.number for person in place.state.people] == [1, 2]
+
+
+def test_each_page_shows_itself_as_a_field_and_others_as_text_and_names_are_escaped():
+    state = AppState(("walk",), "walk")
+    for action in (PersonCame(1, '"><script>'), PersonCame(2, "Bo"), PersonLeft(9)):
+        state = action.apply(state)
+    client = Client(1)
+    bar = PeopleBar(client.gui, 2)
+    bar.render(state)
+    assert "<script>" not in bar._html.content
+    assert html.escape('"><script>') in bar._html.content
+    assert 'value="Bo"' in bar._html.content
+
+
+@pytest.mark.parametrize(
+    ("what", "action"),
+    [("cancel-job?number=3", CancelJob(3)), ("go-to-step?step=0&count=4", GoToStep(0, 4))],
+)
+def test_a_page_asks_with_its_secret_and_nobody_without(place, what, action):
+    client, _ = place.come(TAB)
+    before = list(place.actions)
+    assert place.ask("made-up", what) == (200, "gone")
+    assert place.actions == before
+    assert place.ask(client.secret, what) == (200, "here")
+    assert place.actions == [*before, action]
+    place.visitors.go(client)
+    count = len(place.actions)
+    assert place.ask(client.secret, what) == (200, "gone")
+    assert len(place.actions) == count
+
+
+@pytest.mark.parametrize(
+    "what", ["cancel-job", "cancel-job?number=-1", "go-to-step?step=x&count=1", "hello?tab=../x", "delete-all", "hello"]
+)
+def test_what_a_page_makes_up_is_refused(place, what):
+    client, _ = place.come(TAB)
+    before = list(place.actions)
+    assert place.ask(client.secret, what)[0] == 404
+    assert place.actions == before
+
+
+def steps(count):
+    state = AppState(("walk",), "walk")
+    for number in range(count):
+        state = ChooseAlignment(f"a{number}").apply(state)
+    return state
+
+
+def test_going_to_a_step_keeps_all_others_and_a_list_that_changed_is_not_trusted():
+    state = steps(5)
+    there = GoToStep(2, 6).apply(state)
+    assert there.annotation == state.past[2]
+    assert (len(there.past), len(there.future)) == (2, 3)
+    assert GoToStep(5, 6).apply(there).annotation == state.annotation
+    for stale in (GoToStep(2, 5), GoToStep(6, 6)):
+        after = stale.apply(state)
+        assert after.annotation == state.annotation
+        assert "changed meanwhile" in after.notice.text
+
+
+def test_going_to_a_step_without_the_selected_pair_selects_one_that_is_there():
+    state = PickPoint(Side.SCAN, (1, 2, 3)).apply(AppState(("walk",), "walk"))
+    assert GoToStep(0, 2).apply(state).selected_key is None
+
+
+def test_the_list_says_each_step_and_where_people_stand():
+    client = Client(1)
+    panel = HistoryPanel(client.gui, lambda action: None)
+    panel.render(AppState(("walk",), "walk"))
+    assert "Nothing was changed yet" in panel._list.content
+    panel.render(Undo().apply(steps(3)))
+    rows = re.findall(r"<button.*?gazeloc-(\w+)\".*?<span>(\d+)</span> (.*?)</button>", panel._list.content)
+    assert rows == [
+        ("undone", "3", "Alignment a2 put in force"),
+        ("now", "2", "Alignment a1 put in force"),
+        ("done", "1", "Alignment a0 put in force"),
+        ("done", "0", "The beginning"),
+    ]
+    panel.render(steps(200))
+    assert panel._list.content.count("<button") == MAX_SHOWN
+    assert "141 earlier steps" in panel._list.content
