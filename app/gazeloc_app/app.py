@@ -64,8 +64,8 @@ from gazeloc_app.show_route import add_show_route
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_app.suggestions import Proposals
-from gazeloc_app.view_saving import ViewSaver
 from gazeloc_app.view_memory import ViewMemory
+from gazeloc_app.view_saving import ViewSaver
 from gazeloc_app.visitors import Visitors
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError

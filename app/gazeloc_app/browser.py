@@ -108,7 +108,7 @@ class Browser:
     def look_again(self, recording: str | None, frame: int) -> None:
         """Look through the frame that this browser looked through before a reload, where there still is one."""
         self.looking.look_again(recording, frame)
-        self._show_leave()
+        self._controls.render(self._state())
 
     def render(self, state: AppState) -> None:
         """Follow the frame slider while looking through a camera of the recording; show the keypoints in it."""

@@ -1,29 +1,21 @@
-// What only the page knows of its view, kept for its browser tab over reloads: the panels' open tabs, wipe and blend.
+// The panels' open tabs, which only the page knows, kept for its browser tab over reloads.
 (function tabView() {
-  const KEY = "gazeloc-view";
+  const KEY = "gazeloc-open-tabs";
   const TRIES = 100;
 
   function load() {
     try {
-      return JSON.parse(sessionStorage.getItem(KEY)) || {};
+      return JSON.parse(sessionStorage.getItem(KEY)) || [];
     } catch {
-      return {};
+      return [];
     }
   }
 
-  // The comparison keeps its sliders in variables named --gazeloc-… of the page's style, and in window.gazeloc….
   function save() {
-    const style = document.documentElement.style;
-    const names = Array.from(style).filter((name) => name.startsWith("--gazeloc-"));
-    const values = Object.keys(window).filter((key) => /^gazeloc[A-Z]/.test(key) && typeof window[key] !== "object");
     const open = Array.from(document.querySelectorAll("[role=tab][aria-selected=true]"), (tab) => tab.textContent);
-    const view = {
-      tabs: open.length ? open : load().tabs,
-      style: Object.fromEntries(names.map((name) => [name, style.getPropertyValue(name)])),
-      values: Object.fromEntries(values.map((key) => [key, window[key]])),
-    };
+    if (!open.length) return;
     try {
-      sessionStorage.setItem(KEY, JSON.stringify(view));
+      sessionStorage.setItem(KEY, JSON.stringify(open));
     } catch {
       // no storage: the next load begins anew
     }
@@ -43,12 +35,6 @@
     if (event.isTrusted && event.target instanceof Element && event.target.closest("[role=tab]")) setTimeout(save, 300);
   }
 
-  const before = load();
-  for (const [name, value] of Object.entries(before.style || {})) document.documentElement.style.setProperty(name, value);
-  Object.assign(window, before.values || {});
-  addEventListener("pagehide", save);
   for (const kind of ["pointerup", "keyup"]) addEventListener(kind, saveAfterTab, true);
-  window.gazeloc.onHello(() => {
-    for (const name of load().tabs || []) openTab(name, TRIES);
-  });
+  window.gazeloc.onHello(() => load().forEach((name) => openTab(name, TRIES)));
 })();

@@ -148,7 +148,7 @@ def test_a_click_in_the_history_goes_to_that_step_and_keys_go_on(open_app, proje
     page.viewer.save("people-history")
     page.page.get_by_text("Keypoint 2 placed on the scan").click()
     page.until(lambda: len(page.pairs) == 2 and page.pairs[1].sfm is None)
-    assert project.keypoints("walk").pairs == page.pairs
+    page.viewer.wait_until(lambda: project.keypoints("walk").pairs == page.pairs)
     page.viewer.wait_for_node("/keypoints/k3/scan", present=False)
     page.page.mouse.move(640, 400)
     page.page.keyboard.press("Control+Shift+z")
