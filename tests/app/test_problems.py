@@ -11,7 +11,7 @@ from app_project import FRAMES, make_app_project
 from app_steps import step, stop
 from gazeloc_app.actions.marks import MarkFrame
 from gazeloc_app.actions.playing import Play, PlayOn, SetSpeed, TogglePlay
-from gazeloc_app.actions.views import BeginAt, ShowFrame
+from gazeloc_app.actions.views import BeginAt, ShowFrame, StepFrame
 from gazeloc_app.app import App
 from gazeloc_app.panels.frames import FramePanel
 from gazeloc_app.problems import frame_table, next_problem, worst_first
@@ -147,6 +147,15 @@ def test_a_picture_through_the_original_lens_has_the_recordings_own_shape(app):
         shapes.append(cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR).shape[:2])
     camera, lens = app.data.camera("walk"), app.data.recording("walk").camera
     assert shapes == [(camera.height, camera.width), (lens.height, lens.width)]
+
+
+def test_quick_steps_add_up_and_end_at_the_ends(app):
+    step(app, *[StepFrame(1, FRAMES - 1)] * 5)
+    assert app.store.state.frame == 5
+    step(app, *[StepFrame(-1, FRAMES - 1)] * 9)
+    assert app.store.state.frame == 0
+    step(app, StepFrame(99, FRAMES - 1))
+    assert app.store.state.frame == FRAMES - 1
 
 
 def test_the_first_pose_is_not_gone_to_where_somebody_went_on_already(app):

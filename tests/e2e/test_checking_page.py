@@ -92,7 +92,7 @@ def test_keys_mark_step_and_play_and_a_click_in_the_timeline_goes_there(page):
     page.page.keyboard.press("b")
     page.until(lambda: page.state.annotation.marks.get(4) is not None)
     assert page.state.annotation.marks.get(4).mark is Mark.BAD
-    page.page.keyboard.press("ArrowRight")
+    page.page.keyboard.press("l")
     page.until(lambda: page.state.frame == 5)
     page.page.keyboard.press("n")
     page.until(lambda: page.state.frame != 5)

@@ -19,6 +19,18 @@ class ShowFrame:
 
 
 @dataclass(frozen=True)
+class StepFrame:
+    """Some frames on or back, from wherever quick steps before it led; `last` is the recording's last frame."""
+
+    step: int
+    last: int
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with the frame."""
+        return replace(state, frame=min(max(state.frame + self.step, 0), self.last))
+
+
+@dataclass(frozen=True)
 class BeginAt:
     """The first frame worth showing is known; it is not shown where somebody went to another one meanwhile."""
 

@@ -9,7 +9,7 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.playing import SPEEDS, SetSpeed, TogglePlay
-from gazeloc_app.actions.views import ShowFrame
+from gazeloc_app.actions.views import ShowFrame, StepFrame
 from gazeloc_app.data import ProjectData
 from gazeloc_app.problems import FrameTable, frame_table, next_problem
 from gazeloc_app.state import AppState, Level
@@ -29,7 +29,7 @@ class PlayWidgets:
         self._speed = gui.add_dropdown(
             "Speed", tuple(_SPEED_NAMES), initial_value="1×", hint="Of playing, against real time."
         )
-        steps = gui.add_button_group("", _STEPS, hint="The arrow keys step, too.")
+        steps = gui.add_button_group("", _STEPS, hint="The keys J and L go one frame back and on.")
         problems = gui.add_button_group(
             "", _PROBLEMS, hint="No pose, a low score, or marked bad or unsure. The key N goes to the next."
         )
@@ -39,9 +39,9 @@ class PlayWidgets:
         widgets.on_user(problems, lambda event: self._to_problem(str(event.target.value)), event="on_click")
         toggle = gui.add_command("Play or stop", hotkey="space")
         widgets.on_user(toggle, lambda _: dispatch(TogglePlay()), event="on_trigger")
-        back = gui.add_command("One frame back", hotkey="arrowleft")
+        back = gui.add_command("One frame back", hotkey="J")
         widgets.on_user(back, lambda _: self._step(_STEPS[0]), event="on_trigger")
-        ahead = gui.add_command("One frame on", hotkey="arrowright")
+        ahead = gui.add_command("One frame on", hotkey="L")
         widgets.on_user(ahead, lambda _: self._step(_STEPS[1]), event="on_trigger")
         problem = gui.add_command("Next problem", hotkey="N", description="No pose, low score, marked bad or unsure")
         widgets.on_user(problem, lambda _: self._to_problem(_PROBLEMS[1]), event="on_trigger")
@@ -64,10 +64,10 @@ class PlayWidgets:
         if "keyframe" in which and keyframes is not None and len(keyframes):
             later, earlier = keyframes[keyframes > frame], keyframes[keyframes < frame]
             target = (later[0] if len(later) else frame) if "▶" in which else (earlier[-1] if len(earlier) else frame)
+            self._dispatch(ShowFrame(int(target)))
         else:
-            target = frame + (1 if "▶" in which else -1)
-        last = len(self._data.recording(state.recording)) - 1
-        self._dispatch(ShowFrame(min(max(int(target), 0), last)))
+            last = len(self._data.recording(state.recording)) - 1
+            self._dispatch(StepFrame(1 if "▶" in which else -1, last))
 
     def _to_problem(self, which: str) -> None:
         if self._state is None or which not in _PROBLEMS:
