@@ -62,6 +62,7 @@ class ProjectData:
         self._said: set[str] = set()
         self._lock = threading.RLock()
         self._known: dict[str, tuple[object, Any]] = {}
+        self._slots: dict[str, list[tuple[int, str | None]]] = {}
 
     def scan(self) -> RoomScan:
         """The scan as its file has it."""
@@ -160,7 +161,15 @@ class ProjectData:
         placed = [PlacedModel(model, alignment.scan_from_sfm), *self.pieces(recording)]
         load = lambda: localize_sfm(times, keyframes, placed)  # noqa: E731
         content = (key, model, id(keyframes), _stamp(self.project.artifact(recording, "pieces")))
-        return self._remember_or_say(f"{recording} trajectory", content, load)
+        return self._remember_or_say(f"{recording} trajectory {self._slot(recording, key)}", content, load)
+
+    def _slot(self, recording: str, key: str | None) -> int:
+        """Where poses are remembered: two alignments are looked at in turns, with a third the older one goes."""
+        with self._lock:
+            kept = self._slots.setdefault(recording, [(0, None), (1, None)])
+            slot = next((slot for slot, other in kept if other == key), kept[0][0])
+            self._slots[recording] = [*(item for item in kept if item[0] != slot), (slot, key)]
+            return slot
 
     def pieces(self, recording: str) -> list[PlacedModel]:
         """The smaller pieces of the reconstruction that have a place in the scan."""

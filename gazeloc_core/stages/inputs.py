@@ -139,7 +139,7 @@ def load_gaze(arrays: dict[str, Any]) -> GazeInScan:
 def sfm_models(project: Project, recording: str) -> Artifact:
     """Where the models are that the method `sfm` places: bent to the tags if that stage has run, else as they came."""
     bent = project.artifact(recording, "anchoring")
-    if project.settings.tags is not None and bent.exists:
+    if bent.exists and project.settings.tags is not None:
         return bent
     return project.artifact(recording, "reconstruction")
 

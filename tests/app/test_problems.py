@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
-from app_project import FRAMES, make_app_project
+from app_project import FRAMES, SFM_FROM_SCAN, make_app_project
 from app_steps import step, stop
+from gazeloc_app import data
 from gazeloc_app.actions.marks import MarkFrame
 from gazeloc_app.actions.playing import Play, PlayOn, SetSpeed, TogglePlay
 from gazeloc_app.actions.views import BeginAt, ShowFrame, StepFrame
@@ -147,6 +149,13 @@ def test_a_picture_through_the_original_lens_has_the_recordings_own_shape(app):
         shapes.append(cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR).shape[:2])
     camera, lens = app.data.camera("walk"), app.data.recording("walk").camera
     assert shapes == [(camera.height, camera.width), (lens.height, lens.width)]
+
+
+def test_two_alignments_in_turns_are_placed_once_each(app, monkeypatch):
+    placed = []
+    monkeypatch.setattr(data, "localize_sfm", lambda *arguments: placed.append(arguments) or len(placed))
+    monkeypatch.setattr(app.data, "alignment", lambda _, key: SimpleNamespace(scan_from_sfm=SFM_FROM_SCAN.inverse()))
+    assert [app.data.trajectory("walk", key) for key in "abababcbcb"] == [1, 2, 1, 2, 1, 2, 3, 2, 3, 2]
 
 
 def test_quick_steps_add_up_and_end_at_the_ends(app):

@@ -18,6 +18,7 @@ from gazeloc_app.frame_marks import marks_in_frame
 from gazeloc_app.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.state import AppState, Layer
+from gazeloc_core.trajectory import PoseStatus
 
 _AHEAD = (1, -1, 2)
 """The frames, from the one that is shown, whose pictures a page may fetch while it is idle."""
@@ -73,7 +74,9 @@ class ComparisonHtml:
 
     def _has_pose(self, recording: str, key: str | None, frame: int) -> bool:
         trajectory = self._data.trajectory(recording, key)
-        return trajectory is not None and frame < len(trajectory) and trajectory.pose(frame) is not None
+        if trajectory is None or frame >= len(trajectory):
+            return False
+        return PoseStatus(str(trajectory.status[frame])).has_pose
 
     def _shapes(self, state: AppState, frame: int) -> dict[str, str]:
         camera, lens = self._data.camera(state.recording), self._data.recording(state.recording).camera

@@ -94,12 +94,12 @@ class FramePanel:
         frame = min(state.frame, last)
         widgets.set_value(self._slider, frame)
         trajectory = self._data.trajectory(state.recording, key)
-        has_pose = trajectory is not None and trajectory.pose(frame) is not None
+        status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
+        has_pose = PoseStatus(status).has_pose
         widgets.set_value(self._tags, state.draws_tags)
         is_anywhere = has_pose or image_of_frame(self._data, state.recording, frame) is not None
         widgets.set_property(self._look, "disabled", not is_anywhere)
         self._comparison.show(state, frame, self._other_poses(state))
-        status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
         widgets.set_content(self._facts, widgets.box(self._facts_html(state, frame, status)))
 
     def _facts_html(self, state: AppState, frame: int, status: str) -> str:
