@@ -221,6 +221,7 @@ class App:
             problem_panel = ProblemPanel(gui, self.data, dispatch)
         with side.add_tab("Help"):
             self._help = HelpPanel(gui, self._toggle_look)
+        self._panels = (gui.main_panel, side)
         side.dock_left()
         side.set_width(430)
         work = (project_panel, keypoint_panel, loupe_panel, keypoint_files, suggestion_panel, alignment_panel)
@@ -268,7 +269,7 @@ class App:
     async def _connected(self, client: viser.ClientHandle) -> None:
         browser = Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
         self._browsers[client.client_id] = browser
-        self._looks[client.client_id] = look = Look(client)
+        self._looks[client.client_id] = look = Look(client, self._panels)
         self._help.show((self.server.gui, client.gui))
         look.remember()
         self._visitors.come(client, browser, self.store.state)

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import viser
+from viser._messages import GuiSetPanelWidthMessage
 from viser.theme import TitlebarConfig, TitlebarImage
 
-from gazeloc_app.palette import BACKGROUND, BACKGROUND_DARK, BRAND, Rgb
+from gazeloc_app.palette import BACKGROUND, BACKGROUND_DARK, Rgb, theme_color
 
 log = logging.getLogger(__name__)
 _KEY = "gazeloc-look"
 _ANSWER_S = 5.0
+_SETTLED_S = 10.0
+NARROW_PX = 320
+"""A view of the room that is narrower than this, on a page that has just been opened, asks for narrower panels."""
+TABLET_PANEL_PX = 320
 _LOGO = TitlebarImage(
     image_url_light="/static/logo-light.svg", image_url_dark="/static/logo-dark.svg", image_alt="GazeLoc", href=None
 )
@@ -27,7 +34,7 @@ def set_theme(gui: viser.GuiApi, *, is_dark: bool = False) -> None:
         dark_mode=is_dark,
         show_logo=False,
         show_share_button=False,
-        brand_color=BRAND,
+        brand_color=theme_color(is_dark=is_dark),
     )
 
 
@@ -37,11 +44,25 @@ def set_background(scene: viser.SceneApi, *, is_dark: bool = False) -> None:
     scene.set_background_image(np.full((2, 2, 3), color, dtype=np.uint8), format="png")
 
 
-class Look:
-    """The look of one connected browser."""
+def set_panel_width(client: viser.ClientHandle, panel: Any, width_px: float) -> None:
+    """A panel's width in one browser; viser itself has it for all of them only.
 
-    def __init__(self, client: viser.ClientHandle):
-        self._client = client
+    Raises nothing where the person has moved the panel: the page then keeps what it has.
+    """
+    gui = client.gui
+    message = GuiSetPanelWidthMessage(
+        panel._placement_uuid, width_px, counter=gui._next_layout_counter(), run_id=gui._layout_run_id
+    )
+    gui._websock_interface.queue_message(message)
+
+
+class Look:
+    """The look of one connected browser; on a tablet its panels are narrower, so that something of the room is left."""
+
+    def __init__(self, client: viser.ClientHandle, panels: Sequence[Any]):
+        self._client, self._panels = client, panels
+        self._until = time.monotonic() + _SETTLED_S
+        client.camera.on_update(self._fit)
         self._is_dark = False
         toggle: Any = client.gui.add_command("Light or dark", description="The look of the app in this browser")
         toggle.on_trigger(self._toggled)
@@ -63,6 +84,13 @@ class Look:
         """The other look, remembered by the browser."""
         self._show(is_dark=not self._is_dark)
         self._client.local_storage.set_item(_KEY, "dark" if self._is_dark else "light")
+
+    async def _fit(self, camera: viser.CameraHandle) -> None:
+        """Once, while the page still settles: later on its widths are the person's."""
+        if time.monotonic() < self._until and camera.image_width < NARROW_PX:
+            self._until = 0.0
+            for panel in self._panels:
+                set_panel_width(self._client, panel, TABLET_PANEL_PX)
 
     async def _toggled(self, _event: object) -> None:
         self.toggle()

@@ -7,9 +7,14 @@ light and dark.
 
 from __future__ import annotations
 
+import colorsys
+
 Rgb = tuple[int, int, int]
 
 BRAND: Rgb = (28, 110, 140)
+"""Of buttons and of the tab that is open."""
+BRAND_DARK: Rgb = (84, 178, 214)
+"""The same in the dark, where letters on it are black."""
 TRUTH: Rgb = (60, 200, 130)
 ESTIMATE: Rgb = (200, 20, 20)
 PHONE: Rgb = (70, 110, 200)
@@ -21,6 +26,7 @@ PAPER: Rgb = (255, 255, 255)
 PAPER_DARK: Rgb = (36, 36, 36)
 
 _MEANINGS: dict[str, tuple[str, str]] = {
+    "brand": ("#1c6e8c", "#54b2d6"),
     "good": ("#23753a", "#69db7c"),
     "warning": ("#9c4d00", "#ffa94d"),
     "bad": ("#c92a2a", "#ff8787"),
@@ -49,9 +55,21 @@ def _rgb(hexadecimal: str) -> Rgb:
     return red, green, blue
 
 
+def theme_color(*, is_dark: bool) -> Rgb:
+    """The colour to give viser so that its buttons come out in the brand's.
+
+    It makes ten shades, by lightness, from 0.9 to the given one, which is the ninth. Mantine takes the seventh in the
+    light and the ninth in the dark.
+    """
+    if is_dark:
+        return BRAND_DARK
+    hue, lightness, saturation = colorsys.rgb_to_hls(*(channel / 255 for channel in BRAND))
+    red, green, blue = colorsys.hls_to_rgb(hue, 0.9 - (0.9 - lightness) * 8 / 6, saturation)
+    return round(255 * red), round(255 * green), round(255 * blue)
+
+
 def css() -> str:
     """The style sheet that defines all of them; Mantine, which viser is built with, marks the page that is dark."""
     light = "".join(f"--gazeloc-{name}:{values[0]};" for name, values in _MEANINGS.items())
     dark = "".join(f"--gazeloc-{name}:{values[1]};" for name, values in _MEANINGS.items())
-    brand = "--gazeloc-brand:#{:02x}{:02x}{:02x};".format(*BRAND)
-    return f':root{{{brand}{light}}}\n:root[data-mantine-color-scheme="dark"]{{{dark}}}\n'
+    return f':root{{{light}}}\n:root[data-mantine-color-scheme="dark"]{{{dark}}}\n'

@@ -13,6 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.once import Once
+from gazeloc_app.palette import ESTIMATE, PHONE, TRUTH
 from gazeloc_app.scene.errors import ErrorsLayer
 from gazeloc_app.scene.frusta import CameraSet, FrustaLayer
 from gazeloc_app.state import AppState, Coloring, Layer
@@ -24,7 +25,7 @@ from gazeloc_core.glb import Rgb
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
-GREEN, RED, BLUE = (30, 170, 70), (225, 40, 40), (60, 110, 200)
+GREEN, RED, BLUE = TRUTH, ESTIMATE, PHONE
 METHOD_COLORS = {
     Method.SFM: (130, 60, 200),
     Method.SFM_PAPER: (240, 140, 0),

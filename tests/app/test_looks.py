@@ -6,11 +6,13 @@ from unittest.mock import MagicMock
 import pytest
 from app_project import make_app_project
 from app_steps import step, stop
+from gazeloc_app import looks
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
 from gazeloc_app.looks import Look
 from gazeloc_app.panels.help import WORDS, commands_of
 from viser import ViserServer
+from viser._messages import GuiSetPanelWidthMessage
 from visitor import CAMERA, get, page, until
 
 
@@ -105,7 +107,7 @@ def look_of(stored):
         client.local_storage.get_item.side_effect = stored
     else:
         client.local_storage.get_item.return_value = stored
-    return Look(client), client
+    return Look(client, ()), client
 
 
 @pytest.mark.parametrize("stored", [None, "light", "purple", "<script>", RuntimeError("gone"), TimeoutError("slow")])
@@ -122,3 +124,34 @@ def test_the_dark_is_remembered_by_the_browser():
     look.toggle()
     assert client.gui.configure_theme.call_args.kwargs["dark_mode"] is False
     client.local_storage.set_item.assert_called_with("gazeloc-look", "light")
+
+
+@pytest.mark.parametrize(("width_px", "panels"), [(190, 2), (450, 0)])
+def test_a_tablets_panels_are_narrower_once(app, monkeypatch, width_px, panels):
+    set_to = []
+    monkeypatch.setattr(looks, "set_panel_width", lambda client, panel, width: set_to.append((panel, width)))
+
+    async def talk():
+        async with page(app.server.get_port()) as visitor:
+            known = set(app._looks)
+            await visitor.send(CAMERA)
+            await until(lambda: set(app._looks) - known)
+            for fov in (0.81, 0.82, 0.83):
+                await visitor.send(CAMERA | {"image_width": width_px, "fov": fov})
+            await until(lambda: any(c.camera.fov == 0.83 for c in app.server.get_clients().values()))
+            await asyncio.sleep(0.1)
+
+    asyncio.run(talk())
+    assert [width for _, width in set_to] == [looks.TABLET_PANEL_PX] * panels
+
+
+def test_viser_takes_a_panels_width_for_one_browser(app):
+    def look(client):
+        sent = []
+        client.gui._websock_interface.queue_message = sent.append
+        looks.set_panel_width(client, app.server.gui.main_panel, 300)
+        return sent
+
+    (message,) = while_connected(app, look)
+    assert isinstance(message, GuiSetPanelWidthMessage)
+    assert (message.width, message.uuid) == (300, app.server.gui.main_panel._placement_uuid)

@@ -4,8 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+import viser
 from gazeloc_app import palette
+from gazeloc_app.looks import set_theme
 from gazeloc_app.scene_cameras import STATUS_COLORS
+from viser._messages import ThemeConfigurationMessage
 
 # Viénot, Brettel and Mollon 1999: what a deuteranope and a protanope see of linear sRGB.
 DEUTERANOPE = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
@@ -44,8 +47,24 @@ def test_words_are_legible_in_light_and_dark(name):
     assert contrast(dark, palette.shades("card")[1]) >= 4.5
 
 
-def test_white_is_legible_on_the_brands_colour():
+def test_letters_are_legible_on_the_brands_colour_and_it_on_paper():
     assert contrast(palette.BRAND, (255, 255, 255)) >= 4.5
+    assert contrast(palette.BRAND_DARK, (0, 0, 0)) >= 4.5
+    assert contrast(palette.BRAND_DARK, palette.PAPER_DARK) >= 4.5
+    assert palette.shades("brand") == (palette.BRAND, palette.BRAND_DARK)
+
+
+@pytest.mark.parametrize(("is_dark", "shade", "brand"), [(False, 6, palette.BRAND), (True, 8, palette.BRAND_DARK)])
+def test_visers_buttons_come_out_in_the_brands_colour(is_dark, shade, brand):
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        set_theme(server.gui, is_dark=is_dark)
+        buffered = server._websock_server._broadcast_buffer.message_from_id.values()
+        (theme,) = [message for message in buffered if isinstance(message, ThemeConfigurationMessage)]
+    finally:
+        server.stop()
+    made = bytes.fromhex(theme.colors[shade][1:])
+    assert np.abs(np.array(list(made)) - brand).max() <= 3
 
 
 @pytest.mark.parametrize("eyes", [np.eye(3), DEUTERANOPE, PROTANOPE], ids=["three", "deuteranope", "protanope"])

@@ -23,7 +23,7 @@ from playwright.sync_api import Browser, sync_playwright  # noqa: E402
 
 from gazeloc_core.project import Project  # noqa: E402
 
-LOOKS = {"light": (1280, 800, ""), "dark": (1280, 800, "darkMode&"), "tablet": (1024, 768, "")}
+LOOKS = {"light": (1280, 800), "dark": (1280, 800), "tablet": (1024, 768)}
 
 
 def main(folder: Path, out: Path, only: tuple[str, ...]) -> None:
@@ -33,12 +33,12 @@ def main(folder: Path, out: Path, only: tuple[str, ...]) -> None:
         browser = launch(playwright, chromium_path() or "chromium")
         copy = Path(shutil.copytree(folder, Path(work) / "studio"))
         with _app(folder, copy) as app:
-            for name, (width, height, query) in LOOKS.items():
+            for name, size in LOOKS.items():
                 if not only or name in only:
-                    _shoot_tabs(browser, app, f"{app.address}/?{query}", (width, height), out, name)
+                    _shoot_tabs(browser, app, size, out, name)
         if not only or "empty" in only:
             with _app(folder, Path(work) / "empty") as app:
-                _shoot_tabs(browser, app, f"{app.address}/?", (1280, 800), out, "empty")
+                _shoot_tabs(browser, app, (1280, 800), out, "empty")
         browser.close()
 
 
@@ -58,15 +58,17 @@ def _app(folder: Path, copy: Path) -> Iterator[App]:
         app.stop()
 
 
-def _shoot_tabs(browser: Browser, app: App, address: str, size: tuple[int, int], out: Path, look: str) -> None:
+def _shoot_tabs(browser: Browser, app: App, size: tuple[int, int], out: Path, look: str) -> None:
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     viewer = ViewerPage(page)
-    viewer.open(address).wait_until_drawn(100)
+    viewer.open(app.address).wait_until_drawn(100)
     view = AppPage(viewer, app)
+    if look == "dark":
+        view.tab("Help").press("Light or dark")
     page.wait_for_timeout(3000)
     for tab in page.get_by_role("tab").all_inner_texts():
         view.tab(tab)
-        page.wait_for_timeout(1200)
+        page.wait_for_timeout(800)
         page.screenshot(path=str(out / f"{look}-{tab.strip().lower()}.png"))
     page.close()
 

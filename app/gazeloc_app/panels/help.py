@@ -17,6 +17,7 @@ MOUSE = (
     ("Shift click", "set a point, on the scan or in the frame that is looked through"),
     ("Ctrl K", "find a command by its name"),
 )
+NAMES = {"arrowleft": "←", "arrowright": "→", "arrowup": "↑", "arrowdown": "↓"}
 WORDS = (
     ("scan", "the room as the phone measured it; in metres, its axes are never changed"),
     ("recording", "what the glasses recorded: frames, gaze, times"),
@@ -68,7 +69,7 @@ def _keys(command: Any) -> str:
         return "–"
     modifiers = {"cmd/ctrl": "Ctrl", "alt": "Alt", "shift": "Shift"}
     parts = [modifiers[part] for part in (command.modifier or "").split("+") if part]
-    return " ".join([*parts, str(command.hotkey)])
+    return " ".join([*parts, NAMES.get(command.hotkey, str(command.hotkey).capitalize())])
 
 
 def _more(command: Any) -> str:
