@@ -29,11 +29,11 @@ def while_connected(app, look):
 
     async def talk():
         async with page(app.server.get_port()) as visitor:
+            known = set(app._looks)
             await visitor.send(CAMERA)
-            await until(lambda: app.server.get_clients())
-            await until(lambda: app._browsers)
-            (client,) = app.server.get_clients().values()
-            return look(client)
+            await until(lambda: set(app._looks) - known)
+            (client_id,) = set(app._looks) - known
+            return look(app.server.get_clients()[client_id])
 
     return asyncio.run(talk())
 

@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -49,7 +50,7 @@ def _app(folder: Path, copy: Path) -> Iterator[App]:
     if copy.is_dir():
         project.save(Project.open(folder).settings)
     else:
-        project = Project.create(copy, Project.open(folder).settings)
+        project = Project.create(copy, replace(Project.open(folder).settings, chosen={}))
     app = App(project, port=0)
     app.start()
     try:
