@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from unittest.mock import MagicMock
+
 import numpy as np
 import pytest
 from app_project import SFM_FROM_SCAN, make_app_project, true_poses
 from app_steps import step, stop
 from gazeloc_app.actions.pairs import RenamePair, SelectPair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
+from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.app import App
 from gazeloc_app.frame_marks import marks_in_frame, next_frame_seeing
+from gazeloc_app.looking import Looking, Target
 from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.sightings import triangulated
 
@@ -96,3 +100,19 @@ def test_the_panels_drawing_has_names_that_cannot_do_harm(app):
     assert "&lt;script&gt;alert(1)&lt;/script&gt;: clicked here" in drawing
     assert "polyline" in marks_svg(*marks(app, 8), app.data.camera("walk"), None)
     assert marks_svg([], [], app.data.camera("walk"), None) == ""
+
+
+def test_a_frame_that_cannot_be_looked_through_is_said_once_while_the_slider_stays_on_it(app):
+    client = MagicMock()
+    client.camera.image_width, client.camera.image_height = 800, 600
+    looking = Looking(client, app.data, app._render, lambda: app.store.state, app.store.dispatch)
+    looking.look(0)
+    assert looking.target == Target("walk", 0)
+    step(app, ShowFrame(1))  # no keyframe, so it is not in the reconstruction
+    for _ in range(3):
+        looking.follow(app.store.state)
+        app.store.step()
+    assert app.store.applied == 2
+    step(app, ShowFrame(2))
+    looking.follow(app.store.state)
+    assert looking.target == Target("walk", 2)

@@ -110,9 +110,17 @@ def scrubbing(work: Path) -> list[Row]:
     return rows
 
 
+def picking(work: Path) -> list[Row]:
+    """Clicks on half a million triangles."""
+    from bench_picking import bench_picking
+
+    return bench_picking(work)
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
     "suggestions": suggestions,
+    "picking": picking,
     "scene": whole_scene,
     "chair": real_chair,
     "bedroom": real_bedroom,

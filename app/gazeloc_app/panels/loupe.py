@@ -6,6 +6,7 @@ The frames are enlarged by CSS, from pictures that the page mostly has already.
 from __future__ import annotations
 
 import secrets
+from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
@@ -18,7 +19,7 @@ from gazeloc_app.frame_marks import Mark, marks_in_frame
 from gazeloc_app.loupe import ACROSS_M, loupe_url
 from gazeloc_app.state import AppState
 from gazeloc_core.camera import Camera
-from gazeloc_core.keypoints import KeypointPair
+from gazeloc_core.keypoints import KeypointPair, KeypointSet
 
 MOST_FRAMES = 2
 """Frames beside the scan; the ones that were clicked come first."""
@@ -63,10 +64,11 @@ class LoupePanel:
         model, camera = self._data.model(state.recording), self._data.camera(state.recording)
         if model is None or camera is None:
             return []
+        alone = replace(state, annotation=replace(state.annotation, keypoints=KeypointSet((pair,))))
         found: list[tuple[int, Mark]] = []
         for frame in _spread([int(frame) for frame in model.frame_indices if frame >= 0]):
-            marks, _ = marks_in_frame(self._data, state, Side.SFM, frame)
-            found += [(frame, mark) for mark in marks if mark.key == pair.key]
+            marks, _ = marks_in_frame(self._data, alone, Side.SFM, frame)
+            found += [(frame, mark) for mark in marks]
         middle = np.array([camera.width, camera.height]) / 2
         return sorted(
             found, key=lambda item: (not item[1].is_clicked, np.hypot(*(middle - (item[1].x_px, item[1].y_px))))
