@@ -117,6 +117,20 @@ def picking(work: Path) -> list[Row]:
     return bench_picking(work)
 
 
+def crashes(work: Path) -> list[Row]:
+    """Two browsers at work, and kill -9."""
+    from bench_crash import bench_crash
+
+    return bench_crash(work)
+
+
+def lag(work: Path) -> list[Row]:
+    """The server's event loop while jobs run."""
+    from bench_lag import bench_lag
+
+    return bench_lag(work)
+
+
 BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "alignment": alignment,
     "suggestions": suggestions,
@@ -129,6 +143,8 @@ BENCHES: dict[str, Callable[[Path], list[Row]]] = {
     "scrub": scrubbing,
     "size": scene_at_size,
     "door": door,
+    "crash": crashes,
+    "lag": lag,
 }
 
 
