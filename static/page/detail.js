@@ -1,4 +1,5 @@
 // While the view moves and a frame takes long, a quarter of the lines and points is drawn; all again when it rests.
+// While the page loads there are none, so that what is still to come does not wait for frames that nobody looks at.
 // The server sends both in a shuffled order, so that any first part of them is spread evenly.
 (function spareDetail() {
   const viewer = window.__viserMutable;
@@ -10,11 +11,14 @@
   const SLOW_MS = 90;
   const REST_MS = 250;
   const SHARE = 0.25;
+  const LOADED_MS = 200;
   const before = scene.onBeforeRender;
   let seen = "";
   let drawnAt = 0;
   let isSparing = false;
   let rest = 0;
+  let isLoading = true;
+  let nodes = 0;
 
   function draw(share) {
     for (const [name, node] of Object.entries(viewer.nodeRefFromName)) {
@@ -31,6 +35,7 @@
 
   function settle() {
     isSparing = false;
+    isLoading = false;
     draw(1);
     viewer.requestRender();
   }
@@ -43,6 +48,15 @@
     const took = now - drawnAt;
     seen = view;
     drawnAt = now;
+    if (isLoading) {
+      const count = Object.keys(viewer.nodeRefFromName).length;
+      draw(0);
+      if (count === nodes) return;
+      nodes = count;
+      clearTimeout(rest);
+      rest = setTimeout(settle, LOADED_MS);
+      return;
+    }
     if (!moves) return;
     if (took > SLOW_MS && took < 5000) isSparing = true;
     if (!isSparing) return;

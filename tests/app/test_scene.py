@@ -5,7 +5,7 @@ import pytest
 from gazeloc_app.routes import Routes
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import FrameInSceneLayer, SelectedFrameLayer, look_through, picture_plane
-from gazeloc_app.scene.frusta import EDGES, CameraSet, FrustaLayer, frustum_points
+from gazeloc_app.scene.frusta import EDGES, FEW_EDGES, MANY, CameraSet, FrustaLayer, _lines, frustum_points
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.grid import GridLayer, grid_lines
 from gazeloc_app.scene.keypoints import SELECTED, KeypointsLayer
@@ -154,6 +154,14 @@ def test_any_number_of_cameras_is_one_node(server, sent):
     assert sent == []
     layer.show(None)
     assert "/frusta/estimate" not in names(server)
+
+
+def test_each_of_very_many_cameras_has_fewer_lines_and_shows_how_it_is_turned():
+    poses = RigidTransform.from_components(np.zeros((MANY + 1, 3)), Rotation.identity())
+    few = _lines(CameraSet(poses, CAMERA, (255, 0, 0)), 0.1)[1]
+    every = _lines(CameraSet(poses[:MANY], CAMERA, (255, 0, 0)), 0.1)[1]
+    assert len(few) == (MANY + 1) * len(FEW_EDGES) < len(every) == MANY * len(EDGES)
+    assert [1, 2] in FEW_EDGES.tolist()  # between the picture's upper corners
 
 
 def test_tags_are_moved_by_an_alignment_and_labelled(server, sent):

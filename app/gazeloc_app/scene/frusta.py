@@ -15,6 +15,9 @@ from gazeloc_core.glb import Rgb, wires_glb
 EDGES: Ints = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1], [1, 5], [5, 2]], dtype=np.int64)
 """The lines between a pyramid's points: four edges, the picture's frame, and a roof that marks its top."""
 POINTS = 6
+FEW_EDGES: Ints = EDGES[:5]
+"""What is drawn of each of many: its four edges, and the picture's upper one, which shows how it is turned."""
+MANY = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,8 @@ def _lines(cameras: CameraSet | None, depth_m: float) -> tuple[Floats, Ints, Byt
     pyramids = frustum_points(cameras.scan_from_camera, cameras.camera, depth_m)
     order = np.random.default_rng(0).permutation(len(pyramids))  # static/page/detail.js draws a part while moving
     first = POINTS * order[:, None, None]
-    points, edges = pyramids.reshape(-1, 3), (first + EDGES).reshape(-1, 2)
+    of_each = EDGES if len(pyramids) <= MANY else FEW_EDGES
+    points, edges = pyramids.reshape(-1, 3), (first + of_each).reshape(-1, 2)
     each = np.broadcast_to(np.asarray(cameras.colors, dtype=np.uint8), (len(pyramids), 3))
     colors = np.repeat(each, POINTS, axis=0)
     if cameras.path is None:
