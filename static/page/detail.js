@@ -9,13 +9,15 @@
     return;
   }
   const SLOW_MS = 90;
+  const FAST_MS = 20;
   const REST_MS = 250;
   const SHARE = 0.25;
   const LOADED_MS = 200;
   const before = scene.onBeforeRender;
   let seen = "";
   let drawnAt = 0;
-  let isSparing = false;
+  let wasMoving = false;
+  let slow = 0;
   let rest = 0;
   let isLoading = true;
   let nodes = 0;
@@ -34,7 +36,6 @@
   }
 
   function settle() {
-    isSparing = false;
     isLoading = false;
     draw(1);
     viewer.requestRender();
@@ -43,7 +44,7 @@
   scene.onBeforeRender = function (renderer, drawn, camera, ...others) {
     before.call(this, renderer, drawn, camera, ...others);
     const now = performance.now();
-    const view = camera.matrixWorld.elements.join() + camera.projectionMatrix.elements.join();
+    const view = camera.matrixWorld.elements.join(); // a resized window is no movement
     const moves = view !== seen && seen !== "";
     const took = now - drawnAt;
     seen = view;
@@ -57,9 +58,9 @@
       rest = setTimeout(settle, LOADED_MS);
       return;
     }
-    if (!moves) return;
-    if (took > SLOW_MS && took < 5000) isSparing = true;
-    if (!isSparing) return;
+    if (moves && wasMoving) slow = took > SLOW_MS ? slow + 1 : took < FAST_MS ? 0 : slow;
+    wasMoving = moves;
+    if (!moves || slow < 2) return; // the first frame after a rest says nothing about speed
     draw(SHARE);
     clearTimeout(rest);
     rest = setTimeout(settle, Math.max(REST_MS, 1.5 * took)); // not between two slow frames
