@@ -18,6 +18,7 @@
   let drawnAt = 0;
   let wasMoving = false;
   let slow = 0;
+  let pace = 0;
   let rest = 0;
   let isLoading = true;
   let nodes = 0;
@@ -37,6 +38,7 @@
 
   function settle() {
     isLoading = false;
+    wasMoving = false;
     draw(1);
     viewer.requestRender();
   }
@@ -58,11 +60,14 @@
       rest = setTimeout(settle, LOADED_MS);
       return;
     }
-    if (moves && wasMoving) slow = took > SLOW_MS ? slow + 1 : took < FAST_MS ? 0 : slow;
+    if (moves && wasMoving) {
+      slow = took > SLOW_MS ? slow + 1 : took < FAST_MS ? 0 : slow;
+      pace = took;
+    }
     wasMoving = moves;
     if (!moves || slow < 2) return; // the first frame after a rest says nothing about speed
     draw(SHARE);
     clearTimeout(rest);
-    rest = setTimeout(settle, Math.max(REST_MS, 1.5 * took)); // not between two slow frames
+    rest = setTimeout(settle, Math.max(REST_MS, 1.5 * pace)); // not between two slow frames
   };
 })();

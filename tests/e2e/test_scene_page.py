@@ -6,8 +6,8 @@ import threading
 
 import numpy as np
 import pytest
-from gazeloc_app import picking
-from gazeloc_app.routes import Routes
+from gazeloc_app import palette, picking
+from gazeloc_app.routes import Routes, add_static_route
 from gazeloc_app.scene import frusta, tags
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import PLANE_M, FrameInSceneLayer, SelectedFrameLayer, look_through
@@ -63,7 +63,9 @@ def room() -> Mesh:
 
 @pytest.fixture
 def server():
-    server = make_server(0, Routes())
+    routes = Routes()
+    add_static_route(routes)
+    server = make_server(0, routes)
     mesh = room()
     turned, is_clear = facing(mesh, [[2, 1.5, 1.3]])
     assert is_clear
@@ -154,7 +156,7 @@ def test_layers_appear_where_they_belong_and_hide(server, open_page):
     keypoints.show(KeypointSet((KeypointPair("k1", "desk corner", place, None),)), None)
     estimate = frusta.FrustaLayer(server.scene, "estimate", depth_m=0.4)
     pose = RigidTransform.from_components([[2.5, 1.0, 1.2]], Rotation.from_euler("x", [-90], degrees=True))
-    estimate.show(frusta.CameraSet(pose, CAMERA, frusta.ESTIMATE))
+    estimate.show(frusta.CameraSet(pose, CAMERA, palette.ESTIMATE))
     corners = np.array([[[0.01, 1, 1], [0.01, 1.4, 1], [0.01, 1.4, 1.4], [0.01, 1, 1.4]]])
     outlines = tags.TagsLayer(server.scene, "scan", tags.SCAN_TAGS)
     outlines.show(TagCorners(np.array([7]), corners, np.array([3]), np.array([0.001])))
@@ -170,10 +172,10 @@ def test_layers_appear_where_they_belong_and_hide(server, open_page):
     assert page.has_color_near(place, SCAN_SIDE)
     assert page.label_at(place)
     assert page.label_at(corners[0].mean(axis=0))
-    assert pixels_of(page, frusta.ESTIMATE) > 50
+    assert pixels_of(page, palette.ESTIMATE) > 50
     for layer in (cloud, keypoints, estimate, outlines, gaze):
         layer.set_visible(False)
-    page.wait_until(lambda: pixels_of(page, frusta.ESTIMATE) == 0)
+    page.wait_until(lambda: pixels_of(page, palette.ESTIMATE) == 0)
     page.wait_until(lambda: not page.label_at(place))
     assert page.color_at(point).tolist() in [list(color) for color in WALLS.values()]
 
