@@ -10,6 +10,8 @@ import json
 import os
 import socket
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -23,11 +25,25 @@ if sys.platform == "win32":
     def _lock(file: IO[str]) -> None:
         file.seek(1 << 20)  # past the text, which others must be able to read
         msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+
+    def _lock_when_free(file: IO[str]) -> None:
+        msvcrt.locking(file.fileno(), msvcrt.LK_LOCK, 1)
 else:
     import fcntl
 
     def _lock(file: IO[str]) -> None:
         fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def _lock_when_free(file: IO[str]) -> None:
+        fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+
+
+@contextmanager
+def brief_lock(path: Path) -> Iterator[None]:
+    """Keep others out while a file is read, changed and written: the app and its worker process both write settings."""
+    with path.open("a+", encoding="utf-8") as file:
+        _lock_when_free(file)
+        yield
 
 
 class WriteLock:

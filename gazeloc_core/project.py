@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.files import read_json, settle_folders, write_json_atomically
 from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.lock import WriteLock
+from gazeloc_core.lock import WriteLock, brief_lock
 from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
 
@@ -149,6 +150,9 @@ class Project:
         """
         return WriteLock(self.folder / ".lock")
 
+    def _changing_settings(self) -> AbstractContextManager[None]:
+        return brief_lock(self.folder / ".settings.lock")
+
     def settle(self) -> None:
         """Clear up after a process that was killed while it wrote. Only for who holds the lock."""
         for parent in (self.folder, *(self.folder / where for where in ("annotations", "scan"))):
@@ -164,10 +168,13 @@ class Project:
             ProjectError: if the name is taken or cannot be a folder's name.
         """
         _check_name(name)
-        settings = self.settings
-        if name in settings.recordings:
-            raise ProjectError(f"{self.folder}: a recording is already called {name!r}; choose another with --name.")
-        self.save(replace(settings, recordings={**settings.recordings, name: entry}))
+        with self._changing_settings():
+            settings = self.settings
+            if name in settings.recordings:
+                raise ProjectError(
+                    f"{self.folder}: a recording is already called {name!r}; choose another with --name."
+                )
+            self.save(replace(settings, recordings={**settings.recordings, name: entry}))
 
     def recording(self, name: str) -> RecordingEntry:
         """One recording's entry.
@@ -184,9 +191,10 @@ class Project:
 
     def choose(self, recording: str, chosen: Chosen | None) -> None:
         """Put an alignment in force, or none."""
-        settings = self.settings
-        others = {name: value for name, value in settings.chosen.items() if name != recording}
-        self.save(replace(settings, chosen=others if chosen is None else {**others, recording: chosen}))
+        with self._changing_settings():
+            settings = self.settings
+            others = {name: value for name, value in settings.chosen.items() if name != recording}
+            self.save(replace(settings, chosen=others if chosen is None else {**others, recording: chosen}))
 
     def method(self, recording: str) -> Method:
         """The method whose poses a recording is shown and exported with."""
@@ -194,8 +202,9 @@ class Project:
 
     def choose_method(self, recording: str, method: Method) -> None:
         """Show and export a recording with another method's poses from now on."""
-        settings = self.settings
-        self.save(replace(settings, methods={**settings.methods, recording: method}))
+        with self._changing_settings():
+            settings = self.settings
+            self.save(replace(settings, methods={**settings.methods, recording: method}))
 
     def scan_artifact(self, stage: str) -> Artifact:
         """The place of a stage's result about the scan."""

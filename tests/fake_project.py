@@ -83,5 +83,7 @@ def contents(folder: Path) -> dict[str, str]:
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in (".lock", ".hashes.json") and not path.name.endswith(".failed.json")
+        if path.is_file()
+        and path.name not in (".lock", ".settings.lock", ".hashes.json")
+        and not path.name.endswith(".failed.json")
     }

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from gazeloc_core.errors import GazelocError, InputError, ProjectError, ProjectL
 from gazeloc_core.files import folder_replaced_atomically
 from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Chosen, Project, RecordingEntry, ScanEntry, Settings, TagEntry
 
 
@@ -212,3 +214,21 @@ def test_a_missing_input_is_named(tmp_path: Path):
 
 def test_value_hashes_ignore_the_order_of_keys():
     assert hash_of_value({"a": 1, "b": [2.0]}) == hash_of_value({"b": [2.0], "a": 1})
+
+
+def test_choices_made_at_the_same_time_are_all_kept(project: Project):
+    """The app's loop and its worker process change different parts of one file."""
+    names = [f"walk {number}" for number in range(6)]
+
+    def choose(name: str) -> None:
+        for turn in range(10):
+            project.choose(name, Chosen(alignment=f"a{turn}", by_person=True))
+            project.choose_method(name, Method.TAGS if turn % 2 else Method.SFM)
+
+    threads = [threading.Thread(target=choose, args=(name,)) for name in names]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {name: chosen.alignment for name, chosen in project.settings.chosen.items()} == dict.fromkeys(names, "a9")
+    assert project.settings.methods == dict.fromkeys(names, Method.TAGS)
