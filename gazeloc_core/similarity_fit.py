@@ -193,10 +193,9 @@ def leave_one_out(pairs: Correspondences, inlier: Bools) -> tuple[Similarity | N
     kept = inlier & (np.arange(len(pairs.group_names))[:, None] != pairs.group_index)
     is_determined = _determines(pairs.scan, kept) & _determines(pairs.sfm, kept)
     scale, rotation, shift = solve_umeyama(pairs.sfm, pairs.scan, np.where(kept, pairs.weights, _NO_WEIGHT))
+    turns = Rotation.from_matrix(np.where(is_determined[:, None, None], rotation, np.eye(3)))
     return tuple(
-        Similarity(float(scale[group]), Rotation.from_matrix(rotation[group]), shift[group])
-        if is_determined[group]
-        else None
+        Similarity(float(scale[group]), turns[group], shift[group]) if is_determined[group] else None
         for group in range(len(kept))
     )
 

@@ -226,7 +226,7 @@ def _open(browser: Browser, app: App) -> ViewerPage:
 
 def _take(viewer: ViewerPage, app: App, name: str) -> None:
     for page in app._browsers.values():
-        page._choice.value = name
+        page._choice.value, page._snap.value = name, False
     viewer.page.wait_for_timeout(300)
 
 
