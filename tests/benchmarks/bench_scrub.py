@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from e2e.app_page import AppPage
 from e2e.page import ViewerPage
 from gazeloc_app.app import App
 from playwright.sync_api import Browser
@@ -12,8 +13,7 @@ SIZE = {"width": 1280, "height": 900}
 _WATCH = """
 () => {
   window.__scrub = null;
-  addEventListener('keydown', (event) => {
-    if (event.key !== 'Enter') return;
+  addEventListener('input', (event) => {
     const start = performance.now(), wanted = String(Number(event.target.value));
     const look = () => {
       const stage = document.querySelector('.gazeloc-stage');
@@ -76,11 +76,9 @@ def _quick(viewer: ViewerPage, app: App, moves: int = 30) -> Row:
 
 
 def _time(viewer: ViewerPage, frame: int) -> float:
-    field = viewer.page.locator("label", has_text="Frame").first.locator("xpath=ancestor::div[.//input][1]")
-    box = field.locator("input:not([type=hidden])").first
+    box = AppPage(viewer, None).field("Frame")
     viewer.page.evaluate(_WATCH)
     box.fill(str(frame))
-    box.press("Enter")
     viewer.page.wait_for_function("() => window.__scrub !== null", timeout=30_000, polling=20)
     return float(viewer.page.evaluate("window.__scrub"))
 
