@@ -16,7 +16,7 @@ window.gazelocComparison = (() => {
   const KEY = "gazeloc-comparison";
   const AHEAD_MS = 400;
   const choice = Object.assign({ mode: "wipe", wipe: 50, blend: 50, lens: false }, stored());
-  let root, stage, said, gaze, overlay, names, wanted, isBusy, shown, ahead;
+  let root, stage, said, gaze, overlay, names, latest, wanted, isBusy, shown, ahead;
 
   function stored() {
     try {
@@ -88,7 +88,7 @@ window.gazelocComparison = (() => {
       row.hidden = row.dataset.mode !== choice.mode;
       row.querySelector("input").value = choice[row.dataset.mode];
     }
-    if (lens !== choice.lens || (choice.mode === "two" && mode !== "two")) show(shown);
+    if (lens !== choice.lens || (choice.mode === "two" && mode !== "two")) show(latest);
     if (choice.mode === "edges") drawEdges();
   }
 
@@ -98,7 +98,8 @@ window.gazelocComparison = (() => {
     box.append(root);
     const share = Number(box.dataset.number) / Math.max(Number(box.dataset.last), 1);
     document.documentElement.style.setProperty("--gazeloc-frame", `${100 * share}%`);
-    show({ ...box.dataset, overlay: [...box.querySelector(".gazeloc-overlay").children] });
+    latest = { ...box.dataset, overlay: [...box.querySelector(".gazeloc-overlay").children] };
+    show(latest);
   }
 
   function show(what) {
