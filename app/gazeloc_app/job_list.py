@@ -29,29 +29,35 @@ class JobList:
         self._path = project.folder / "jobs.json"
         self._recordings = frozenset(project.settings.recordings)
         self._say = say
+        self._on_disk: Any = []
+        """The file's entries as far as they are known; None where they are damaged."""
 
     def read(self) -> tuple[Job, ...]:
         """What was under way at the end; nothing, and a sentence, where the file is damaged."""
         if not self._path.exists():
             return ()
+        self._on_disk = None
         try:
             value = read_json(self._path, "the list of jobs")
+            self._on_disk = value["jobs"]
             return tuple(job for entry in value["jobs"] if (job := _job_from_json(entry, self._recordings)))
         except (GazelocError, KeyError, TypeError, ValueError, AttributeError) as error:
             self._say(f"{self._path}: the list of jobs is damaged ({error}); start anew what you want done.")
             return ()
 
     def save(self, before: AppState, after: AppState) -> None:
-        """Write the list where it changed.
+        """Write the list where it differs from the file.
 
         Raises:
             ProjectError: if it cannot be written.
         """
-        old, new = _to_json(before), _to_json(after)
-        if old == new:
+        del before  # what is offered may have been read, and dismissed, within one batch of actions
+        new = _to_json(after)
+        if new == self._on_disk:
             return
         try:
             write_json_atomically(self._path, {"version": VERSION, "jobs": new})
+            self._on_disk = new
         except OSError as error:
             raise ProjectError(
                 f"{self._path}: the list of jobs could not be saved ({error.strerror}); they go on, but are not "

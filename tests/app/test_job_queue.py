@@ -3,6 +3,8 @@
 import json
 
 import pytest
+from app_project import make_app_project
+from app_steps import step, stop
 from fake_project import make_project
 from gazeloc_app import job_list, tasks
 from gazeloc_app.actions.jobs import (
@@ -15,7 +17,9 @@ from gazeloc_app.actions.jobs import (
     ResumeJobs,
     StartJob,
 )
+from gazeloc_app.app import App
 from gazeloc_app.job_list import JobList
+from gazeloc_app.panels.jobs import JobBar
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 
@@ -152,3 +156,26 @@ def test_a_damaged_list_is_said_and_offers_nothing(kept, project, told, text):
     assert kept.read() == ()
     assert len(told) == 1
     assert "jobs.json" in told[0]
+
+
+def test_a_start_after_a_kill_offers_what_ran_and_begins_it_only_when_somebody_says_so(tmp_path, monkeypatch):
+    project = make_app_project(tmp_path)
+    JobList(project, print).save(fresh(), apply(fresh(), ALIGN, EXPORT))
+    app = App(project, port=0)
+    begun = []
+    monkeypatch.setattr(app.jobs, "start", lambda name, task, **keywords: begun.append((name, keywords)))
+    bar = next(view.__self__ for view in app.store._views if isinstance(getattr(view, "__self__", None), JobBar))
+    step(app)
+    assert bar._resume.visible
+    assert bar._resume.label == "Go on with 2 jobs"
+    assert "ended while it worked on “Align”, “Export”" in bar._offer.content
+    assert begun == []
+    step(app, ResumeJobs())
+    assert begun == [("Align", {"recording": "walk"})]
+    assert names(app.store.state) == ["Align", "Export"]
+    assert not bar._resume.visible
+    stop(app)
+    again = App(project, port=0)
+    step(again, DismissJobs())
+    stop(again)
+    assert JobList(project, print).read() == ()
