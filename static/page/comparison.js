@@ -94,6 +94,7 @@ window.gazelocComparison = (() => {
 
   // Move into the box that the panel has sent, and show what it names.
   function take(box) {
+    if (!box.isConnected) return; // a newer one has come already
     if (!root) build();
     box.append(root);
     const share = Number(box.dataset.number) / Math.max(Number(box.dataset.last), 1);
