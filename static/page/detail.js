@@ -11,12 +11,12 @@
   const SLOW_MS = 90;
   const FAST_MS = 20;
   const REST_MS = 250;
+  const PAUSE_MS = 2500;
   const SHARE = 0.25;
   const LOADED_MS = 200;
   const before = scene.onBeforeRender;
   let seen = "";
-  let drawnAt = 0;
-  let wasMoving = false;
+  let movedAt = 0;
   let slow = 0;
   let pace = 0;
   let rest = 0;
@@ -38,7 +38,6 @@
 
   function settle() {
     isLoading = false;
-    wasMoving = false;
     draw(1);
     viewer.requestRender();
   }
@@ -48,9 +47,7 @@
     const now = performance.now();
     const view = camera.matrixWorld.elements.join(); // a resized window is no movement
     const moves = view !== seen && seen !== "";
-    const took = now - drawnAt;
     seen = view;
-    drawnAt = now;
     if (isLoading) {
       const count = Object.keys(viewer.nodeRefFromName).length;
       draw(0);
@@ -60,14 +57,16 @@
       rest = setTimeout(settle, LOADED_MS);
       return;
     }
-    if (moves && wasMoving) {
-      slow = took > SLOW_MS ? slow + 1 : took < FAST_MS ? 0 : slow;
-      pace = took;
+    if (!moves) return;
+    const since = now - movedAt; // frames without movement lie between, and tell nothing
+    movedAt = now;
+    if (since < PAUSE_MS) {
+      slow = since > SLOW_MS ? slow + 1 : since < FAST_MS ? 0 : slow;
+      pace = since;
     }
-    wasMoving = moves;
-    if (!moves || slow < 2) return; // the first frame after a rest says nothing about speed
+    if (slow < 2) return;
     draw(SHARE);
     clearTimeout(rest);
-    rest = setTimeout(settle, Math.max(REST_MS, 1.5 * pace)); // not between two slow frames
+    rest = setTimeout(settle, Math.min(Math.max(REST_MS, 1.5 * pace), PAUSE_MS)); // not between two slow frames
   };
 })();

@@ -132,7 +132,7 @@ def _open(browser: Browser, address: str, wanted: tuple[Any, ...]) -> tuple[floa
 
 def _orbit(viewer: ViewerPage) -> float:
     """Frames drawn per second while the view turns."""
-    viewer.page.evaluate(_ORBIT, 1.0)
+    viewer.page.evaluate(_ORBIT, 3.0)  # the page finds out how fast it is
     return float(viewer.page.evaluate(_ORBIT, ORBIT_S))
 
 
