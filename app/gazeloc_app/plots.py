@@ -27,8 +27,10 @@ def to_plotly(drawing: Drawing) -> go.Figure:
         yaxis_title=drawing.y_label,
         margin={"l": 50, "r": 10, "t": 40, "b": 40},
         legend={"orientation": "h", "y": -0.2},
-        font={"size": 11},
+        font={"size": 11, "color": "#7b8794"},  # legible in light and dark
         template="plotly_white",
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
         modebar={"remove": ["zoom", "pan", "select", "lasso", "zoomIn", "zoomOut", "autoScale", "resetScale"]},
     )
     if isinstance(drawing, Chart) and drawing.log_y:

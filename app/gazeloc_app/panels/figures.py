@@ -16,6 +16,7 @@ from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState
 
 NONE = "(not drawn yet)"
+NONE_YET = widgets.card("No figure yet.", "Run everything first: the figures are drawn from the tags that were found.")
 
 
 class FigurePanel:
@@ -54,7 +55,8 @@ class FigurePanel:
         options = tuple(charts) or (NONE,)
         if tuple(self._which.options) != options:
             self._which.options = options
-        widgets.set_content(self._notes, widgets.box("<br>".join(widgets.text(note) for note in notes)))
+        said = "<br>".join(widgets.text(note) for note in notes)
+        widgets.set_content(self._notes, widgets.box(said if charts or notes else NONE_YET))
         self._show(str(self._which.value))
 
     def _show(self, name: str) -> None:

@@ -1,0 +1,35 @@
+"""The app's looks in a real browser: the dark that a browser remembers, and panels that fit."""
+
+import pytest
+from app_project import make_app_project
+from e2e.app_page import AppPage
+from gazeloc_app.app import App
+
+pytestmark = pytest.mark.e2e
+SCHEME = "() => document.documentElement.getAttribute('data-mantine-color-scheme')"
+LOGO = "() => document.querySelector('img[alt=GazeLoc]').naturalWidth"
+CANVAS = "() => window.__viserMutable.canvas.getBoundingClientRect().width"
+
+
+@pytest.fixture
+def app(tmp_path):
+    app = App(make_app_project(tmp_path), port=0)
+    app.start()
+    yield app
+    app.stop()
+
+
+def test_the_dark_is_remembered_and_a_tablet_keeps_room_for_the_scene(app, open_page):
+    viewer = open_page(app.address, width=1024, height=768).wait_until_drawn(300)
+    page = AppPage(viewer, app)
+    assert viewer.page.evaluate(LOGO) > 0
+    assert viewer.page.evaluate(SCHEME) == "light"
+    viewer.wait_until(lambda: viewer.page.evaluate(CANVAS) > 330)
+    page.tab("Help").press("Light or dark")
+    viewer.wait_until(lambda: viewer.page.evaluate(SCHEME) == "dark")
+    viewer.open(app.address).wait_until_drawn(300)
+    viewer.wait_until(lambda: viewer.page.evaluate(SCHEME) == "dark")
+    viewer.wait_until(lambda: viewer.canvas_pixels()[40, 40].max() < 60)
+    color = "() => getComputedStyle(document.querySelector('.gazeloc-card')).backgroundColor"
+    assert viewer.page.evaluate(color) == "rgb(29, 48, 56)"
+    viewer.save("app-dark")
