@@ -25,7 +25,6 @@ from typing import Any
 
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.picks import PickPoint, Side
-from gazeloc_app.annotation_json import changes_to_json
 from gazeloc_app.app import App
 from gazeloc_app.history import History
 from gazeloc_app.saving import Saver, annotation_in_files
@@ -45,6 +44,7 @@ class Outcome:
 
     kills: int = 0
     shown: int = 0
+    """Actions that views had rendered."""
     lost: list[str] = field(default_factory=list)
     """What went wrong, a sentence each."""
     steps: int = 0
@@ -87,7 +87,7 @@ def _check_end(folder: Path, allowed: set[str], outcome: Outcome) -> None:
 
 
 def _one_life(folder: Path, seed: int, until: int, delay_s: float) -> tuple[str | None, int, set[str]]:
-    """The digest at its start, how many states were shown, and with which the next life may start."""
+    """The digest at its start, how many actions were shown, and the digests with which the next life may start."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["crash_life"])
     ours, theirs = context.Pipe(duplex=False)
@@ -96,7 +96,7 @@ def _one_life(folder: Path, seed: int, until: int, delay_s: float) -> tuple[str 
     theirs.close()
     lines: list[str] = []
     with suppress(EOFError):
-        while sum(line.startswith("shown") for line in lines) < until and ours.poll(LIFE_S):
+        while _actions(lines) < until and ours.poll(LIFE_S):
             lines.append(ours.recv_bytes().decode())
     time.sleep(delay_s)
     assert process.pid is not None
@@ -109,8 +109,12 @@ def _one_life(folder: Path, seed: int, until: int, delay_s: float) -> tuple[str 
     started = next((digest for kind, digest in said_of if kind == "started"), None)
     acknowledged = [i for i, (kind, _) in enumerate(said_of) if kind in ("shown", "started")]
     after = said_of[acknowledged[-1] :] if acknowledged else []
-    shown = sum(kind == "shown" for kind, _ in said_of)
-    return started, shown, {digest for _, digest in after}
+    return started, _actions(lines), {digest for _, digest in after}
+
+
+def _actions(lines: list[str]) -> int:
+    """How many actions were applied in the states that were shown."""
+    return max((int(line.split()[2]) for line in lines if line.startswith("shown")), default=0)
 
 
 class Digests:
@@ -126,8 +130,8 @@ class Digests:
     def _of(self, annotation: Annotation) -> str:
         known = self._known.get(id(annotation))
         if known is None:
-            text = json.dumps(changes_to_json(Annotation(), annotation), sort_keys=True)
-            known = self._known[id(annotation)] = (annotation, hashlib.sha256(text.encode()).hexdigest())
+            digest = hashlib.sha256(repr(annotation).encode()).hexdigest()
+            known = self._known[id(annotation)] = (annotation, digest)
         return known[1]
 
 
@@ -135,7 +139,7 @@ def _live(folder: Path, seed: int, pipe: Connection) -> None:
     app, digests = App(Project.open(folder), port=0), Digests()
 
     def say(kind: str, state: AppState) -> None:
-        pipe.send_bytes(f"{kind} {digests(History.of(state))}".encode())
+        pipe.send_bytes(f"{kind} {digests(History.of(state))} {app.store.applied}".encode())
 
     app.store._savers.insert(0, lambda before, after: say("wanted", after))
     app.store.add_view(lambda state: say("shown", state))
