@@ -25,9 +25,9 @@ from typing import Any
 
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.annotation.history import History
+from gazeloc_app.annotation.saving import Saver, annotation_in_files
 from gazeloc_app.app import App
-from gazeloc_app.history import History
-from gazeloc_app.saving import Saver, annotation_in_files
 from gazeloc_app.state import Annotation, AppState
 from viser import _messages
 

@@ -4,8 +4,8 @@ import os
 import time
 from pathlib import Path
 
-from gazeloc_app.jobs import Outcome
 from gazeloc_app.state import Level
+from gazeloc_app.work.jobs import Outcome
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report

@@ -18,21 +18,25 @@ from pathlib import Path
 import numpy as np
 import viser
 
-from gazeloc_app import tasks
 from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
 from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
 from gazeloc_app.actions.views import BeginAt, NameRenderer
+from gazeloc_app.annotation.saving import Saver
+from gazeloc_app.annotation.view_saving import ViewSaver
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
-from gazeloc_app.follow_up import ScoreAfterRun
-from gazeloc_app.job_list import JobList
-from gazeloc_app.jobs import JobRunner
-from gazeloc_app.live_alignment import LiveAlignment
+from gazeloc_app.drawing.pictures import Pictures
+from gazeloc_app.drawing.render_process import RenderProcess
+from gazeloc_app.drawing.render_worker import Describe, SeenTags, Sources
+from gazeloc_app.frames.player import Player
+from gazeloc_app.frames.show_route import add_show_route
+from gazeloc_app.keypoints.live_alignment import LiveAlignment
+from gazeloc_app.keypoints.loupe import add_loupe_route
+from gazeloc_app.keypoints.suggestions import Proposals
 from gazeloc_app.looks import Look
-from gazeloc_app.loupe import add_loupe_route
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.camera_colors import CameraColors
 from gazeloc_app.panels.export import ExportPanel
@@ -51,22 +55,18 @@ from gazeloc_app.panels.problems import ProblemPanel
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.panels.suggestion import SuggestionPanel
 from gazeloc_app.panels.views import ViewList
-from gazeloc_app.pictures import Pictures
-from gazeloc_app.player import Player
-from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import Describe, SeenTags, Sources
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
-from gazeloc_app.saving import Saver
 from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
-from gazeloc_app.show_route import add_show_route
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
-from gazeloc_app.suggestions import Proposals
 from gazeloc_app.view_memory import ViewMemory
-from gazeloc_app.view_saving import ViewSaver
 from gazeloc_app.visitors import Visitors
+from gazeloc_app.work import tasks
+from gazeloc_app.work.follow_up import ScoreAfterRun
+from gazeloc_app.work.job_list import JobList
+from gazeloc_app.work.jobs import JobRunner
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.keypoints import Point

@@ -14,13 +14,13 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import MovePoint
 from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
-from gazeloc_app.facing import place_to_stand
-from gazeloc_app.looking import Looking
+from gazeloc_app.drawing.facing import place_to_stand
+from gazeloc_app.drawing.render_process import RenderProcess
+from gazeloc_app.frames.looking import Looking
+from gazeloc_app.keypoints.picking import ClickFilter
 from gazeloc_app.moving import nudged
 from gazeloc_app.panels.looking import LookingControls
 from gazeloc_app.panels.nudging import add_nudges
-from gazeloc_app.picking import ClickFilter
-from gazeloc_app.render_process import RenderProcess
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.tools.all import TOOLS, shifted, tools_of

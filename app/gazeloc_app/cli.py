@@ -247,7 +247,7 @@ def keypoints(
         side: Which side a list of one side is of (import).
         format: json, csv, cloudcompare-scan, cloudcompare-sfm, stray-scan or stray-sfm (export); else by the ending.
     """
-    from gazeloc_app import keypoint_commands
+    from gazeloc_app.keypoints import keypoint_commands
 
     if action == "import":
         keypoint_commands.import_keypoints(project, file, recording=recording, side=side)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gazeloc_app.picking import pick_mesh
+from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_core.arrays import Floats
 from gazeloc_core.keypoints import Point
 from gazeloc_core.raycast import Raycaster

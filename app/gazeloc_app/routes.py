@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from gazeloc_app.render_process import Superseded
+from gazeloc_app.drawing.render_process import Superseded
 from gazeloc_core.errors import GazelocError, InputError
 from gazeloc_core.resources import static_file
 

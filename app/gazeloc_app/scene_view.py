@@ -14,13 +14,13 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
 from gazeloc_app.dragging import Dragging
-from gazeloc_app.gaze_at import gaze_in_scan
+from gazeloc_app.drawing.render_process import RenderProcess
+from gazeloc_app.drawing.render_worker import Frame
+from gazeloc_app.drawing.scan_screen import ScanScreen
+from gazeloc_app.frames.gaze_at import gaze_in_scan
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
 from gazeloc_app.placement import shown_scan_from_sfm
-from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import Frame
-from gazeloc_app.scan_screen import ScanScreen
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
 from gazeloc_app.scene.gaze import GazeLayer

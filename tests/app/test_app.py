@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from app_project import SFM_FROM_SCAN, make_app_project, true_poses
 from app_steps import step, stop, wait_for_job
-from gazeloc_app import tasks
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.jobs import JobEnded, StartJob
@@ -19,10 +18,11 @@ from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.actions.views import ShowFrame, ShowLayer
 from gazeloc_app.app import App
-from gazeloc_app.pictures import Pictures
-from gazeloc_app.render_process import RenderProcess, Superseded
-from gazeloc_app.sightings import frame_pose, triangulated
+from gazeloc_app.drawing.pictures import Pictures
+from gazeloc_app.drawing.render_process import RenderProcess, Superseded
+from gazeloc_app.frames.sightings import frame_pose, triangulated
 from gazeloc_app.state import Layer, Level
+from gazeloc_app.work import tasks
 from viser import _messages
 
 from gazeloc_core.errors import ProjectLockedError

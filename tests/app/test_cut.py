@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from gazeloc_app.cut import Cut, Plane
-from gazeloc_app.picking import pick_mesh
+from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_app.routes import Routes
 from gazeloc_app.server import make_server
 from scipy.spatial.transform import Rotation

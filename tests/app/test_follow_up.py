@@ -1,10 +1,10 @@
 """A run that ended well is followed by scoring; one that failed or was cancelled is not."""
 
 import pytest
-from gazeloc_app import tasks
 from gazeloc_app.actions.jobs import CancelJob, JobEnded, StartJob
-from gazeloc_app.follow_up import ScoreAfterRun
 from gazeloc_app.state import AppState, Level
+from gazeloc_app.work import tasks
+from gazeloc_app.work.follow_up import ScoreAfterRun
 
 RUN = StartJob("Run everything", tasks.run_all, (("recording", "walk"),))
 ALIGN = StartJob("Align", tasks.align, (("recording", "walk"),))

@@ -12,10 +12,10 @@ from gazeloc_app.actions.pairs import RenamePair, SelectPair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.app import App
-from gazeloc_app.frame_marks import marks_in_frame, next_frame_seeing
-from gazeloc_app.looking import Looking, Target
+from gazeloc_app.frames.frame_marks import marks_in_frame, next_frame_seeing
+from gazeloc_app.frames.looking import Looking, Target
+from gazeloc_app.frames.sightings import triangulated
 from gazeloc_app.panels.marks_svg import marks_svg
-from gazeloc_app.sightings import triangulated
 
 from gazeloc_core.keypoints import Sighting
 

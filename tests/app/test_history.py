@@ -3,17 +3,17 @@
 from dataclasses import fields, replace
 
 import pytest
-from gazeloc_app import history as history_module
 from gazeloc_app import state as state_module
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
-from gazeloc_app.annotation_json import changed_from_json, changes_to_json
-from gazeloc_app.history import History, all_lines, lines_between, read_lines
+from gazeloc_app.annotation import history as history_module
+from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
+from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
+from gazeloc_app.annotation.steps import describe
 from gazeloc_app.state import Annotation, AppState
-from gazeloc_app.steps import describe
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -6,7 +6,6 @@ import pytest
 from app_project import make_app_project
 from app_steps import step, stop
 from fake_project import make_project
-from gazeloc_app import job_list, tasks
 from gazeloc_app.actions.jobs import (
     MAX_WAITING,
     CancelJob,
@@ -18,10 +17,11 @@ from gazeloc_app.actions.jobs import (
     StartJob,
 )
 from gazeloc_app.app import App
-from gazeloc_app.job_list import JobList
 from gazeloc_app.panels.jobs import JobBar
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
+from gazeloc_app.work import job_list, tasks
+from gazeloc_app.work.job_list import JobList
 
 from gazeloc_core.methods import Method
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import job_tasks
 import pytest
-from gazeloc_app import job_log, jobs
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import JobEnded, JobProgressed
-from gazeloc_app.job_log import JobLog
-from gazeloc_app.jobs import JobRunner
-from gazeloc_app.remaining import Remaining
 from gazeloc_app.state import Level
+from gazeloc_app.work import job_log, jobs
+from gazeloc_app.work.job_log import JobLog
+from gazeloc_app.work.jobs import JobRunner
+from gazeloc_app.work.remaining import Remaining
 
 START_S = 60.0
 """A worker's first start imports what its tasks import."""

@@ -14,8 +14,8 @@ from gazeloc_app.actions.live import FitFound, FollowKeypoints
 from gazeloc_app.actions.pairs import EnablePair, RenamePair
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
-from gazeloc_app.live_alignment import is_following
-from gazeloc_app.residuals import pair_residuals
+from gazeloc_app.keypoints.live_alignment import is_following
+from gazeloc_app.keypoints.residuals import pair_residuals
 
 from gazeloc_core.alignment import AlignmentMethod, judge
 from gazeloc_core.correspondences import gather

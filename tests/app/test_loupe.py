@@ -11,7 +11,7 @@ from app_project import MARKS, SFM_FROM_SCAN, make_app_project
 from app_steps import step, stop
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
-from gazeloc_app.loupe import add_loupe_route, loupe_url, pose_facing
+from gazeloc_app.keypoints.loupe import add_loupe_route, loupe_url, pose_facing
 from gazeloc_app.panels.loupe import LoupePanel
 from gazeloc_app.routes import Routes
 

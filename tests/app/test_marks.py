@@ -10,8 +10,8 @@ from app_steps import step, stop
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.views import ShowFrame
+from gazeloc_app.annotation.steps import describe
 from gazeloc_app.app import App
-from gazeloc_app.steps import describe
 
 from gazeloc_core.marks import FrameMark, Mark
 

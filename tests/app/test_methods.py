@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from app_project import make_app_project, true_poses
 from app_steps import step, stop, wait_for_job
-from gazeloc_app import tasks
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.jobs import JobEnded, StartJob
@@ -14,6 +13,7 @@ from gazeloc_app.actions.views import DrawTags, ShowFrame
 from gazeloc_app.app import App
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.state import Level
+from gazeloc_app.work import tasks
 
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project

@@ -9,8 +9,8 @@ import pytest
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.picks import MovePoint, PickPoint, Side
 from gazeloc_app.dragging import Dragging
+from gazeloc_app.keypoints.snapping import snap
 from gazeloc_app.moving import ARROWS, dragged, nudged
-from gazeloc_app.snapping import snap
 from gazeloc_app.state import AppState, Level
 from scipy.spatial.transform import Rotation
 

@@ -128,7 +128,7 @@ def test_the_wheel_works_in_an_empty_environment(wheel: Path, home: Path, tmp_pa
     assert "Reconstruct the keyframes" in call(gazeloc, "status", home / "project", cwd=tmp_path)
     assert '"registered": 2' in call(gazeloc, "evaluate", home / "aligned", "--json", cwd=tmp_path)
     call(gazeloc, "export", home / "aligned", "--format", "colmap", "--output", tmp_path / "out", cwd=tmp_path)
-    call(python, "-c", "import gazeloc_app.app, gazeloc_app.render_worker", cwd=tmp_path)
+    call(python, "-c", "import gazeloc_app.app, gazeloc_app.drawing.render_worker", cwd=tmp_path)
 
 
 def test_every_requirement_is_pinned():

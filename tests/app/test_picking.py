@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gazeloc_app import picking
+from gazeloc_app.keypoints import picking
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from app_project import make_app_project
 from app_steps import step, stop, wait_for_job
-from gazeloc_app import tasks
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.app import App
 from gazeloc_app.panels.problems import ProblemPanel, Which
+from gazeloc_app.work import tasks
 
 from gazeloc_core.marks import Mark
 from gazeloc_core.project import Chosen

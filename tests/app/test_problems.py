@@ -15,9 +15,9 @@ from gazeloc_app.actions.marks import MarkFrame
 from gazeloc_app.actions.playing import Play, PlayOn, SetSpeed, TogglePlay
 from gazeloc_app.actions.views import BeginAt, ShowFrame, StepFrame
 from gazeloc_app.app import App
+from gazeloc_app.frames.problems import frame_table, next_problem, worst_first
+from gazeloc_app.frames.timeline_html import PARTS, timeline_html
 from gazeloc_app.panels.frames import FramePanel
-from gazeloc_app.problems import frame_table, next_problem, worst_first
-from gazeloc_app.timeline_html import PARTS, timeline_html
 
 from gazeloc_core.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.trajectory import Trajectory

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from gazeloc_app.render_process import Superseded
+from gazeloc_app.drawing.render_process import Superseded
 from gazeloc_app.routes import Reply, Routes, add_picture_routes, add_static_route
 
 from gazeloc_core.errors import InputError, RenderError

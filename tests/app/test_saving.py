@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from fake_project import make_project
-from gazeloc_app import saving
 from gazeloc_app.actions.choices import ChooseMethod, OpenRecording
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.picks import PickPoint, Side
-from gazeloc_app.history import History, read_lines
-from gazeloc_app.saving import Saver, annotation_in_files
+from gazeloc_app.annotation import saving
+from gazeloc_app.annotation.history import History, read_lines
+from gazeloc_app.annotation.saving import Saver, annotation_in_files
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 

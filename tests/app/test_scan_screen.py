@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from app_project import make_app_project
 from app_steps import stop
-from gazeloc_app import scan_screen
 from gazeloc_app.app import App
+from gazeloc_app.drawing import scan_screen
 from gazeloc_app.scene import cloud
 
 

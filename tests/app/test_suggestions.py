@@ -12,8 +12,8 @@ from app_steps import step, stop
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.suggest import ShowSuggestions
 from gazeloc_app.app import App
-from gazeloc_app.facing import place_to_stand
-from gazeloc_app.suggestions import Proposals, reason
+from gazeloc_app.drawing.facing import place_to_stand
+from gazeloc_app.keypoints.suggestions import Proposals, reason
 
 from gazeloc_core.next_keypoint import Suggestion, Weakness
 

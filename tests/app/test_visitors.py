@@ -15,7 +15,7 @@ from gazeloc_app.actions.history import GoToStep, Undo
 from gazeloc_app.actions.jobs import CancelJob
 from gazeloc_app.actions.people import MAX_NAME, PersonCame, PersonLeft
 from gazeloc_app.actions.picks import PickPoint, Side
-from gazeloc_app.looking import Target
+from gazeloc_app.frames.looking import Target
 from gazeloc_app.panels.history import MAX_SHOWN, HistoryPanel
 from gazeloc_app.panels.people import PeopleBar
 from gazeloc_app.routes import Routes

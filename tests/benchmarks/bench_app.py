@@ -20,7 +20,7 @@ from e2e.page import ViewerPage, chromium_path, launch
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.app import App
 from gazeloc_app.demo import demo_project
-from gazeloc_app.picking import pick_mesh
+from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_app.tools.scan_point import ScanPointTool
 from playwright.sync_api import Browser, sync_playwright
 

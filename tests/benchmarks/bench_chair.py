@@ -13,7 +13,7 @@ from chair_places import Place, find_places
 from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.data import ProjectData
-from gazeloc_app.sightings import triangulated
+from gazeloc_app.frames.sightings import triangulated
 from gazeloc_app.state import AppState
 
 from gazeloc_core import pipeline

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 from data import SAMPLE_SCENES
-from gazeloc_app import tasks
 from gazeloc_app.actions.jobs import CancelJob, StartJob
 from gazeloc_app.app import App
 from gazeloc_app.demo import demo_project
+from gazeloc_app.work import tasks
 
 from gazeloc_core import pipeline
 from gazeloc_core.methods import Method

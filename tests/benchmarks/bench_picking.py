@@ -23,8 +23,8 @@ from e2e.page import chromium_path, launch
 from fake_project import click, make_project
 from gazeloc_app.actions.live import FitFound
 from gazeloc_app.data import ProjectData
-from gazeloc_app.live_alignment import LiveAlignment
-from gazeloc_app.picking import pick_mesh
+from gazeloc_app.keypoints.live_alignment import LiveAlignment
+from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_app.state import AppState
 from playwright.sync_api import sync_playwright
 from scipy.spatial.transform import Rotation

@@ -184,8 +184,8 @@ def test_one_spot_clicked_in_two_frames_is_a_keypoint_by_triangulation(open_app)
 
 def _in_picture(page, frame, pixel):
     """The place in the scene at which a frame's picture shows a pixel."""
+    from gazeloc_app.frames.sightings import frame_pose
     from gazeloc_app.scene.frames import PLANE_M
-    from gazeloc_app.sightings import frame_pose
 
     camera = page.app.data.camera("walk")
     ray = np.array([*(pixel - camera.principal_point_px) / camera.focal_px, 1.0])

@@ -9,11 +9,11 @@ import pytest
 from app_project import make_app_project
 from e2e.app_page import AppPage
 from e2e.page import ViewerPage
-from gazeloc_app import tasks
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
+from gazeloc_app.work import tasks
 
 from gazeloc_core.project import Project
 

@@ -6,7 +6,8 @@ import threading
 
 import numpy as np
 import pytest
-from gazeloc_app import palette, picking
+from gazeloc_app import palette
+from gazeloc_app.keypoints import picking
 from gazeloc_app.routes import Routes, add_static_route
 from gazeloc_app.scene import frusta, tags
 from gazeloc_app.scene.cloud import CloudLayer

@@ -19,13 +19,13 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS.parent / "app")]
 
 from e2e.app_page import AppPage  # noqa: E402
 from e2e.page import ViewerPage, chromium_path, launch  # noqa: E402
-from gazeloc_app import tasks  # noqa: E402
 from gazeloc_app.actions.choices import CompareMethod  # noqa: E402
 from gazeloc_app.actions.jobs import StartJob  # noqa: E402
 from gazeloc_app.actions.pairs import RenamePair, SelectPair  # noqa: E402
 from gazeloc_app.actions.picks import PickPoint, Side  # noqa: E402
 from gazeloc_app.actions.views import DrawTags, ShowFrame  # noqa: E402
 from gazeloc_app.app import App  # noqa: E402
+from gazeloc_app.work import tasks  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
 
 from gazeloc_core.methods import Method  # noqa: E402

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from gazeloc_app.history import History
+from gazeloc_app.annotation.history import History
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.methods import Method
 

@@ -7,14 +7,15 @@ from typing import Any
 
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.actions.live import FollowKeypoints
 from gazeloc_app.data import ProjectData
-from gazeloc_app.live_alignment import is_following
+from gazeloc_app.keypoints.live_alignment import is_following
 from gazeloc_app.state import AppState, Level
+from gazeloc_app.work import tasks
 from gazeloc_core.alignment import Alignment, AlignmentMethod
 
 NONE = "(none)"

@@ -14,8 +14,8 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
-from gazeloc_app.frame_marks import marks_in_frame
-from gazeloc_app.gaze_at import gaze_as_recorded, gaze_in_frame
+from gazeloc_app.frames.frame_marks import marks_in_frame
+from gazeloc_app.frames.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.trajectory import PoseStatus

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.paths import folder_inside
 from gazeloc_app.state import AppState, Level
+from gazeloc_app.work import tasks
 from gazeloc_core.errors import InputError
 
 FORMATS = {

@@ -7,13 +7,14 @@ from collections.abc import Callable
 import plotly.graph_objects as go
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
-from gazeloc_app.jobs import Task
 from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState
+from gazeloc_app.work import tasks
+from gazeloc_app.work.jobs import Task
 
 NONE = "(not drawn yet)"
 NONE_YET = widgets.card("No figure yet.", "Run everything first: the figures are drawn from the tags that were found.")

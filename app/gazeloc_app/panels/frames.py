@@ -15,12 +15,12 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import CompareWith, DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
+from gazeloc_app.frames.sightings import image_of_frame
+from gazeloc_app.frames.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
 from gazeloc_app.panels.playing import PlayWidgets
-from gazeloc_app.sightings import image_of_frame
 from gazeloc_app.state import AppState, Layer
-from gazeloc_app.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import PoseStatus
 

@@ -9,9 +9,9 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.history import Redo, Undo
-from gazeloc_app.history import History
+from gazeloc_app.annotation.history import History
+from gazeloc_app.annotation.steps import describe
 from gazeloc_app.state import AppState
-from gazeloc_app.steps import describe
 
 MAX_SHOWN = 60
 """Steps in the list, around the one in force; the others are reached by going on from there."""

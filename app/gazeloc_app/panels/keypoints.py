@@ -11,7 +11,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair, SelectPair
 from gazeloc_app.data import ProjectData
-from gazeloc_app.residuals import PairResidual, pair_residuals
+from gazeloc_app.keypoints.residuals import PairResidual, pair_residuals
 from gazeloc_app.state import AppState
 from gazeloc_core.keypoints import KeypointPair, Point, Sighting
 

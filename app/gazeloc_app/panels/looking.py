@@ -15,8 +15,8 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.data import ProjectData
-from gazeloc_app.frame_marks import marks_in_frame, next_frame_seeing, view_of
-from gazeloc_app.looking import Looking, Target
+from gazeloc_app.frames.frame_marks import marks_in_frame, next_frame_seeing, view_of
+from gazeloc_app.frames.looking import Looking, Target
 from gazeloc_app.scene.frame_marks import FrameMarksLayer
 from gazeloc_app.state import AppState, Level
 

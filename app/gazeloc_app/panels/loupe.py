@@ -15,8 +15,8 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
-from gazeloc_app.frame_marks import Mark, marks_in_frame
-from gazeloc_app.loupe import ACROSS_M, loupe_url
+from gazeloc_app.frames.frame_marks import Mark, marks_in_frame
+from gazeloc_app.keypoints.loupe import ACROSS_M, loupe_url
 from gazeloc_app.state import AppState
 from gazeloc_core.camera import Camera
 from gazeloc_core.keypoints import KeypointPair, KeypointSet

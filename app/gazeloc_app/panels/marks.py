@@ -11,8 +11,8 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
+from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.state import AppState
-from gazeloc_app.timeline_html import MARK_SIGNS
 from gazeloc_core.marks import Mark
 
 _KEYS: dict[Mark, Any] = {Mark.GOOD: "G", Mark.BAD: "B", Mark.UNSURE: "U"}

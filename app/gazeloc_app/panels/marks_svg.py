@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gazeloc_app import widgets
-from gazeloc_app.frame_marks import Line, Mark
+from gazeloc_app.frames.frame_marks import Line, Mark
 from gazeloc_core.camera import Camera
 
 CLICKED, EXPECTED, SELECTED = "#ff7800", "#00c8ff", "#ff00c8"

@@ -10,13 +10,14 @@ from urllib.parse import quote
 import numpy as np
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.scene_cameras import METHOD_COLORS, RED
 from gazeloc_app.state import AppState
+from gazeloc_app.work import tasks
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import Trajectory
 

@@ -11,7 +11,7 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.playing import SPEEDS, SetSpeed, TogglePlay
 from gazeloc_app.actions.views import ShowFrame, StepFrame
 from gazeloc_app.data import ProjectData
-from gazeloc_app.problems import FrameTable, frame_table, next_problem
+from gazeloc_app.frames.problems import FrameTable, frame_table, next_problem
 from gazeloc_app.state import AppState, Level
 
 _STEPS = ("◀", "▶", "◀ keyframe", "keyframe ▶")

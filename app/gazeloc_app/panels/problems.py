@@ -9,14 +9,15 @@ from urllib.parse import quote
 import numpy as np
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import FrameErrors, ProjectData
+from gazeloc_app.frames.problems import FrameTable, Problem, worst_first
+from gazeloc_app.frames.timeline_html import MARK_COLORS, MARK_SIGNS
 from gazeloc_app.panels.playing import table_of
-from gazeloc_app.problems import FrameTable, Problem, worst_first
 from gazeloc_app.state import AppState
-from gazeloc_app.timeline_html import MARK_COLORS, MARK_SIGNS
+from gazeloc_app.work import tasks
 from gazeloc_core.marks import FrameMarks, Mark
 
 _MOST = 40

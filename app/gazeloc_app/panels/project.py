@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from viser import GuiApi
 
-from gazeloc_app import tasks, widgets
+from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.state import AppState
+from gazeloc_app.work import tasks
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
 from gazeloc_core.project import Project

@@ -11,8 +11,8 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.suggest import ShowSuggestions
+from gazeloc_app.keypoints.suggestions import Proposal, Proposals
 from gazeloc_app.state import AppState
-from gazeloc_app.suggestions import Proposal, Proposals
 from gazeloc_core.keypoints import Point
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from gazeloc_app.frame_marks import Line, Mark
+from gazeloc_app.frames.frame_marks import Line, Mark
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_core.arrays import Floats
 from gazeloc_core.glb import Rgb

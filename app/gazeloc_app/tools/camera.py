@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_app import picking
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import ShowFrame
+from gazeloc_app.keypoints import picking
 from gazeloc_app.state import Layer
 from gazeloc_app.tools.tool import Click, Tool
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gazeloc_app import picking
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.keypoints import picking
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import Level
 from gazeloc_app.tools.tool import Click, Tool, as_point

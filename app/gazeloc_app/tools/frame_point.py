@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gazeloc_app import picking
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import PickSighting
+from gazeloc_app.frames.sightings import triangulated
+from gazeloc_app.keypoints import picking
 from gazeloc_app.scene.frames import PLANE_M
-from gazeloc_app.sightings import triangulated
 from gazeloc_app.state import Level
 from gazeloc_app.tools.tool import Click, Tool
 from gazeloc_core.keypoints import Sighting, add_sighting

@@ -23,9 +23,9 @@ from typing import Any
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import JobEnded, JobProgressed
-from gazeloc_app.job_log import JobLog
-from gazeloc_app.remaining import Remaining
 from gazeloc_app.state import Level
+from gazeloc_app.work.job_log import JobLog
+from gazeloc_app.work.remaining import Remaining
 from gazeloc_core.errors import Cancelled, GazelocError
 from gazeloc_core.progress import Report
 
@@ -146,7 +146,7 @@ class JobRunner:
 def _serve(connection: Connection, cancel: Event, folder: Path, parent: int) -> None:
     if hasattr(os, "nice"):
         os.nice(5)  # scrubbing through frames goes first
-    importlib.import_module("gazeloc_app.tasks")  # takes seconds: now, not when the first task comes
+    importlib.import_module("gazeloc_app.work.tasks")  # takes seconds: now, not when the first task comes
     report = _report_to(connection, cancel, parent)
     while True:
         try:

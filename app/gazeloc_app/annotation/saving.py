@@ -13,7 +13,7 @@ import logging
 from collections.abc import Callable
 from datetime import datetime
 
-from gazeloc_app.history import History, all_lines, lines_between, read_lines
+from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
 from gazeloc_app.state import MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.journal import Journal

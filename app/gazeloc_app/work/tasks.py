@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gazeloc_app.jobs import Outcome
 from gazeloc_app.state import Level
+from gazeloc_app.work.jobs import Outcome
 from gazeloc_core import pipeline
 from gazeloc_core.chart_file import read_charts
 from gazeloc_core.methods import Method

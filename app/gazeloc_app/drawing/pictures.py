@@ -9,8 +9,8 @@ from concurrent.futures import Future
 from typing import Any
 
 from gazeloc_app.data import ProjectData
-from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import Frame, Render, camera_text
+from gazeloc_app.drawing.render_process import RenderProcess
+from gazeloc_app.drawing.render_worker import Frame, Render, camera_text
 from gazeloc_app.state import AppState
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError

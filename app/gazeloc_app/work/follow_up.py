@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gazeloc_app import tasks
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.state import AppState, Level
+from gazeloc_app.work import tasks
 
 
 class ScoreAfterRun:

@@ -26,7 +26,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from gazeloc_app.render_worker import Cast, Job, Sources, work
+from gazeloc_app.drawing.render_worker import Cast, Job, Sources, work
 from gazeloc_core.errors import GazelocError, RenderError
 
 _log = logging.getLogger(__name__)

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gazeloc_app import tasks
 from gazeloc_app.state import AppState, Job
+from gazeloc_app.work import tasks
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.files import read_json, write_json_atomically
 from gazeloc_core.methods import Method

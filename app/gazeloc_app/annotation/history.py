@@ -14,7 +14,7 @@ from datetime import datetime
 from itertools import pairwise
 from typing import Any
 
-from gazeloc_app.annotation_json import changed_from_json, changes_to_json
+from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
 from gazeloc_app.state import MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import InputError
 

@@ -12,8 +12,8 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
+from gazeloc_app.frames.sightings import frame_pose
 from gazeloc_app.placement import shown_scan_from_sfm
-from gazeloc_app.sightings import frame_pose
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats
 from gazeloc_core.keypoint_views import View, line_of_click

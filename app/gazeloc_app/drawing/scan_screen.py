@@ -14,8 +14,8 @@ from typing import Any
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.views import ScanPrepared
 from gazeloc_app.data import ProjectData
-from gazeloc_app.render_process import RenderProcess
-from gazeloc_app.render_worker import MakeDisplay
+from gazeloc_app.drawing.render_process import RenderProcess
+from gazeloc_app.drawing.render_worker import MakeDisplay
 from gazeloc_app.state import Level
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.scan import Mesh

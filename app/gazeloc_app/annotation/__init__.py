@@ -1,0 +1,1 @@
+"""What people decided, on disk: saved at every step, with its history."""

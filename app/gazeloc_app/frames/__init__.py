@@ -1,0 +1,1 @@
+"""The recording's frames: marks, problems, playing, looking through, the timeline."""

@@ -1,0 +1,1 @@
+"""Keypoints: picking, what pairs are worth, the live alignment, suggestions."""
