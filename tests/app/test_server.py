@@ -101,6 +101,7 @@ def test_another_sites_page_may_not_embed_ours_but_may_link_to_it(server):
         assert get(server, "/hello/you", Sec_Fetch_Site="cross-site", Sec_Fetch_Dest=kind)[0] == 403
     assert get(server, "/", Sec_Fetch_Site="same-site", Sec_Fetch_Dest="iframe")[0] == 403
     assert get(server, "/", Sec_Fetch_Site="cross-site", Sec_Fetch_Dest="document")[0] == 200
+    assert get(server, "/hello/you", Sec_Fetch_Site="cross-site", Sec_Fetch_Dest="document")[0] == 403
     assert get(server, "/hello/you", Sec_Fetch_Site="same-origin", Sec_Fetch_Dest="image")[0] == 200
     assert get(server, "/hello/you", Origin="http://evil.example")[0] == 403
     assert "frame-ancestors 'self'" in get(server)[1]["Content-Security-Policy"]

@@ -64,7 +64,8 @@ class Hosts:
         if is_websocket(request):
             return None if origins else _forbidden("GazeLoc's connection is for its own page in a browser.")
         site = request.headers.get("Sec-Fetch-Site", "none")
-        is_link = request.headers.get("Sec-Fetch-Dest") == "document"
+        is_page = request.path.partition("?")[0] in ("/", "/index.html")  # our routes may change what is shown
+        is_link = is_page and request.headers.get("Sec-Fetch-Dest") == "document"
         if site not in ("same-origin", "none") and not is_link:
             return _forbidden("Another page may not show GazeLoc's pictures.")
         return None
