@@ -72,7 +72,9 @@ def test_clicks_on_the_mesh_make_keypoints_on_the_surface_under_the_pixel(open_a
         pixel = page.click_for(spot, lambda: len(page.pairs))
         clicked = np.array(page.pairs[-1].scan)
         assert len(page.pairs) == number
-        assert np.abs(page.viewer.project(clicked)[0] - pixel).max() < 0.05, spot
+        assert np.abs(page.viewer.project(clicked)[0] - pixel).max() < 0.3, (
+            spot
+        )  # the canvas is no whole number of pixels high
         assert np.linalg.norm(clicked - spot) < 0.02, spot  # a pixel covers a centimetre and more of the floor
         page.page.wait_for_timeout(200)
         page.tab("Keypoints").choose("Selected", "(a new pair)")

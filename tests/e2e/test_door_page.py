@@ -3,7 +3,7 @@
 import pytest
 from e2e.page import ViewerPage
 from gazeloc_app.door.login import new_token
-from gazeloc_app.routes import Routes
+from gazeloc_app.routes import Routes, add_static_route
 from gazeloc_app.server import make_server
 
 pytestmark = pytest.mark.e2e
@@ -11,7 +11,9 @@ pytestmark = pytest.mark.e2e
 
 def test_the_link_opens_the_app_and_a_reload_does_too_without_the_token(browser, tmp_path):
     token = new_token()
-    server = make_server(0, Routes(), allow_hosts=["gaze.test"], token=token)
+    routes = Routes()
+    add_static_route(routes)
+    server = make_server(0, routes, allow_hosts=["gaze.test"], token=token)
     server.scene.add_icosphere("/ball", 0.5)
     address = f"http://localhost:{server.get_port()}"
     context = browser.new_context(viewport={"width": 500, "height": 400})

@@ -119,7 +119,8 @@ def test_a_click_gives_the_ray_through_the_pixel(server, open_page):
         assert clicked.wait(10)
         origin, direction = rays[-1]
         inside = np.asarray(origin) + 2.0 * np.asarray(direction)
-        np.testing.assert_allclose(page.project([inside])[0], pixel, atol=0.01)
+        # Below a title bar the canvas is no whole number of pixels high, which viser rounds: a fifth of a pixel.
+        np.testing.assert_allclose(page.project([inside])[0], pixel, atol=0.3)
         # The near walls face away: go to the target's depth before casting.
         start = np.asarray(origin) + (np.linalg.norm(np.subtract(target, origin)) - 0.8) * np.asarray(direction)
         point = picking.pick_mesh(raycaster, start, direction)
