@@ -13,10 +13,10 @@ NEVER_MS = 15_000.0
 """What was not shown by then counts as that long."""
 SIZE = {"width": 1280, "height": 900}
 _WATCH = """
-() => {
+(wanted) => {
   window.__scrub = null;
-  addEventListener('input', (event) => {
-    const start = performance.now(), wanted = String(Number(event.target.value));
+  addEventListener('input', () => {
+    const start = performance.now();
     const look = () => {
       const stage = document.querySelector('.gazeloc-stage');
       if (stage.dataset.shown === wanted) requestAnimationFrame(() => { window.__scrub = performance.now() - start; });
@@ -79,7 +79,7 @@ def _quick(viewer: ViewerPage, app: App, moves: int = 30) -> Row:
 
 def _time(viewer: ViewerPage, frame: int) -> float:
     box = AppPage(viewer, None).field("Frame")
-    viewer.page.evaluate(_WATCH)
+    viewer.page.evaluate(_WATCH, str(frame))
     box.fill(str(frame))
     try:
         viewer.page.wait_for_function("() => window.__scrub !== null", timeout=NEVER_MS, polling=20)
