@@ -32,20 +32,6 @@ from gazeloc_core.stages import registration
 ON_SCAN = [(1.0, 0.02, 1.5), (0.02, 0.9, 1.6), (3.0, 0.02, 1.1), (0.9, 0.3, 0.76), (2.9, 1.9, 0.47)]
 
 
-@pytest.fixture
-def project(tmp_path):
-    return make_app_project(tmp_path)
-
-
-@pytest.fixture
-def app(project):
-    """The app with its server, the loop not running: `step` applies what was dispatched."""
-    app = App(project, port=0)
-    app.store._render()
-    yield app
-    stop(app)
-
-
 def widgets(app, label):
     """The widgets with this label."""
     handles = app.server.gui._gui_input_handle_from_uuid.values()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import pytest
-from app_project import make_app_project
 from app_steps import step, stop
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
@@ -14,19 +12,6 @@ from gazeloc_app.annotation.steps import describe
 from gazeloc_app.app import App
 
 from gazeloc_core.marks import FrameMark, Mark
-
-
-@pytest.fixture
-def project(tmp_path):
-    return make_app_project(tmp_path)
-
-
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.store._render()
-    yield app
-    stop(app)
 
 
 def marks(app):

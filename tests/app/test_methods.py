@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from app_project import make_app_project, true_poses
-from app_steps import step, stop, wait_for_job
+from app_project import true_poses
+from app_steps import step, wait_for_job
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.jobs import JobEnded, StartJob
 from gazeloc_app.actions.views import DrawTags, ShowFrame
-from gazeloc_app.app import App
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.state import Level
 from gazeloc_app.work import tasks
@@ -20,19 +18,6 @@ from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.poses import fresh_methods
 from gazeloc_core.trajectory import PoseStatus, Trajectory
-
-
-@pytest.fixture
-def project(tmp_path):
-    return make_app_project(tmp_path)
-
-
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.store._render()
-    yield app
-    stop(app)
 
 
 def panel(app) -> MethodPanel:

@@ -6,10 +6,15 @@ import os
 import re
 import warnings
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+from app_project import make_app_project
 from e2e.page import ViewerPage, chromium_path, launch
+from gazeloc_app.app import App
 from playwright.sync_api import Browser, Error, sync_playwright
+
+from gazeloc_core.project import Project
 
 SIZE = {"width": 900, "height": 620}
 HARMLESS = (
@@ -51,6 +56,21 @@ def open_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Call
         viewer.page.context.close()
     complaints = [error for viewer in opened for error in viewer.errors if not any(h in error for h in HARMLESS)]
     assert not complaints, f"the page complained: {complaints}"
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Project:
+    """A small project as the stages would have left it."""
+    return make_app_project(tmp_path)
+
+
+@pytest.fixture
+def app(project: Project) -> Iterator[App]:
+    """The app on it, running."""
+    app = App(project, port=0)
+    app.start()
+    yield app
+    app.stop()
 
 
 @pytest.hookimpl(hookwrapper=True)

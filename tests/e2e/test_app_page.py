@@ -6,9 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from app_project import BOXES, SFM_FROM_SCAN, WALLS, make_app_project, true_poses
+from app_project import BOXES, SFM_FROM_SCAN, WALLS, true_poses
 from e2e.app_page import AppPage
-from gazeloc_app.app import App
 from gazeloc_app.scene_cameras import RED
 from gazeloc_app.state import Layer
 from gazeloc_app.tools.camera import CameraTool
@@ -22,19 +21,6 @@ SIZE = {"width": 1360, "height": 760}
 SPOTS = np.array(
     [(1.5, 0.0, 1.9), (0.0, 1.3, 1.9), (3.4, 0.0, 0.7), (1.3, 0.4, 0.74), (2.8, 2.0, 0.45), (2.2, 1.2, 0.0)]
 )
-
-
-@pytest.fixture
-def project(tmp_path):
-    return make_app_project(tmp_path)
-
-
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.start()
-    yield app
-    app.stop()
 
 
 @pytest.fixture

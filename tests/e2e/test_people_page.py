@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from app_project import make_app_project
 from e2e.app_page import AppPage
 from e2e.page import ViewerPage
 from gazeloc_app.actions.choices import ChooseAlignment
@@ -22,19 +21,6 @@ pytestmark = pytest.mark.e2e
 SIZE = {"width": 1360, "height": 760}
 CORNERS = [[0, 0, 0], [4, 3, 2.6]]
 WALK = (("recording", "walk"),)
-
-
-@pytest.fixture
-def project(tmp_path):
-    return make_app_project(tmp_path)
-
-
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.start()
-    yield app
-    app.stop()
 
 
 @pytest.fixture
