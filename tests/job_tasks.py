@@ -1,14 +1,18 @@
-"""Tasks for the worker process of tests/app/test_jobs.py; the worker imports them by name."""
+"""Tasks of tests for the worker process; the worker imports them by name."""
 
 import os
 import time
 from pathlib import Path
 
 from gazeloc_app.state import Level
+from gazeloc_app.work import tasks
 from gazeloc_app.work.jobs import Outcome
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report
+
+GO = "go"
+"""The file that lets `align_when_told` begin."""
 
 
 def succeed(folder: Path, report: Report, *, alignment: str) -> Outcome:
@@ -46,3 +50,11 @@ def be_deaf(folder: Path, report: Report) -> Outcome:
     (folder / "deaf.pid").write_text(str(os.getpid()))
     time.sleep(600)
     return Outcome("Never.")
+
+
+def align_when_told(folder: Path, report: Report, *, recording: str) -> Outcome:
+    """The app's alignment, held back until somebody writes `go` into the project."""
+    while not (folder / GO).exists():
+        report(0.1, "held back")
+        time.sleep(0.05)
+    return tasks.align(folder, report, recording=recording)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import job_tasks
 import numpy as np
 import pytest
 from e2e.app_page import AppPage
@@ -146,13 +147,14 @@ def test_a_click_in_the_history_goes_to_that_step_and_keys_go_on(open_app, proje
 def test_a_job_goes_on_without_a_page_and_one_that_waits_can_be_taken_off(open_app, open_page):
     page = open_app()
     keywords = (*WALK, ("formats", ("csv",)), ("output", str(page.app.project.folder / "out")))
-    for action in (StartJob("Align", tasks.align, WALK), StartJob("Export", tasks.export, keywords)):
+    for action in (StartJob("Align", job_tasks.align_when_told, WALK), StartJob("Export", tasks.export, keywords)):
         page.app.store.dispatch(action)
     page.page.get_by_text("waits: Export").wait_for()
     page.viewer.save("people-jobs")
     page.page.get_by_label("Take off Export").click()
     page.viewer.wait_until(lambda: not page.state.waiting_jobs)
     page.page.close()
+    (page.app.project.folder / job_tasks.GO).touch()
     end = time.monotonic() + 120
     while page.state.job is not None and time.monotonic() < end:
         time.sleep(0.1)
