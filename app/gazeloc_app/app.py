@@ -12,16 +12,14 @@ import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-import numpy as np
 import viser
 
 from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
 from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
-from gazeloc_app.actions.views import BeginAt, NameRenderer
+from gazeloc_app.actions.views import NameRenderer
 from gazeloc_app.annotation.saving import Saver
 from gazeloc_app.annotation.view_saving import ViewSaver
 from gazeloc_app.browser import Browser
@@ -30,33 +28,17 @@ from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
 from gazeloc_app.drawing.pictures import Pictures
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Describe, SeenTags, Sources
+from gazeloc_app.drawing.render_worker import Describe
+from gazeloc_app.drawing.sources import sources_of
+from gazeloc_app.frames.first_pose import FirstPose
 from gazeloc_app.frames.player import Player
 from gazeloc_app.frames.show_route import add_show_route
 from gazeloc_app.keypoints.live_alignment import LiveAlignment
 from gazeloc_app.keypoints.loupe import add_loupe_route
-from gazeloc_app.keypoints.suggestions import Proposals
 from gazeloc_app.looks import Look
-from gazeloc_app.panels.alignment import AlignmentPanel
-from gazeloc_app.panels.camera_colors import CameraColors
-from gazeloc_app.panels.export import ExportPanel
-from gazeloc_app.panels.figures import FigurePanel
-from gazeloc_app.panels.first_steps import FirstSteps
-from gazeloc_app.panels.frames import FramePanel
+from gazeloc_app.panels.all import Desk, Panels
 from gazeloc_app.panels.help import HelpPanel
-from gazeloc_app.panels.history import HistoryPanel
-from gazeloc_app.panels.jobs import JobBar, JobLogs
-from gazeloc_app.panels.keypoint_files import KeypointFiles
-from gazeloc_app.panels.keypoints import KeypointPanel
-from gazeloc_app.panels.layers import LayerPanel
-from gazeloc_app.panels.loupe import LoupePanel
-from gazeloc_app.panels.methods import MethodPanel
-from gazeloc_app.panels.problems import ProblemPanel
-from gazeloc_app.panels.project import ProjectPanel
-from gazeloc_app.panels.suggestion import SuggestionPanel
-from gazeloc_app.panels.views import ViewList
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
-from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
@@ -69,13 +51,7 @@ from gazeloc_app.work.job_list import JobList
 from gazeloc_app.work.jobs import JobRunner
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
-from gazeloc_core.resources import static_file
-from gazeloc_core.saved_views import SavedView, usual_views
-from gazeloc_core.stages import inputs
-from gazeloc_core.stages.display import make_display
-from gazeloc_core.viewpoint import up_vector
 
 log = logging.getLogger(__name__)
 
@@ -118,7 +94,7 @@ class App:
             self.store.dispatch(OfferJobs(self._job_list.read()))
             self.jobs = JobRunner(project.folder, self.store.dispatch)
             self._visitors = Visitors(ViewMemory(project.folder), self.store.dispatch)
-            self._render = RenderProcess(_sources(project), self._say_trouble)
+            self._render = RenderProcess(sources_of(project), self._say_trouble)
             undo.callback(self._render.close)
             self.server = make_server(
                 port,
@@ -135,7 +111,10 @@ class App:
         self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch)
         self.store.add_view(self.scene.render)
         self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
-        self._build_panels()
+        self.panels = Panels(self._desk())
+        for panel in self.panels:
+            self.store.add_view(panel.render)
+        self._first_pose = FirstPose(self.data, self.store.dispatch)
         self.store.add_view(self._render_browsers)
         self.store.add_view(self._visitors.render)
         self.store.add_saver(self._saver.commit)
@@ -145,14 +124,14 @@ class App:
         self.store.add_effect(self._start_job)
         self.store.add_effect(self.live.follow)
         self.store.add_effect(self._cancel_job)
-        self.store.add_effect(self._show_first_pose)
+        self.store.add_effect(self._first_pose)
         self.store.add_effect(self._player.notice)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 
     def start(self) -> None:
         """Render everything and start the loop; load what the first click and the first picture need."""
-        self._go_to_first_pose(self.store.state)
+        self._first_pose.show(self.store.state)
         self.store.add_effect(ScoreAfterRun(self.store.dispatch))
         self.store.start()
         self.live.start()
@@ -184,62 +163,19 @@ class App:
         """Start the stages that are missing, as the button does."""
         self.store.dispatch(StartJob("Run everything", tasks.run_all, (("recording", self.store.state.recording),)))
 
-    def _build_panels(self) -> None:
-        gui, dispatch, state = self.server.gui, self.store.dispatch, self.store.state
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(400)
-        job_bar = JobBar(gui, dispatch)
-        tabs = gui.add_tab_group(order=1000)
-        with tabs.add_tab("Project"):
-            self._first_steps = FirstSteps(gui, self.data)
-            project_panel = ProjectPanel(gui, self.project, state, dispatch, self._open_recording)
-            job_logs = JobLogs(gui, str(self.project.folder / "logs"))
-        with tabs.add_tab("Keypoints"):
-            keypoint_panel = KeypointPanel(gui, state, self.data, dispatch)
-            loupe_panel = LoupePanel(gui, self.data)
-            ghost = SuggestionLayer(self.server.scene)
-            suggestion_panel = SuggestionPanel(gui, Proposals(self.data), dispatch, self._go_to, ghost.show)
-            keypoint_files = KeypointFiles(gui, state, dispatch)
-        with tabs.add_tab("Align"):
-            alignment_panel = AlignmentPanel(gui, self.data, dispatch)
-        with tabs.add_tab("History"):
-            history_panel = HistoryPanel(gui, dispatch)
-        with tabs.add_tab("Methods"):
-            method_panel = MethodPanel(gui, self.data, dispatch)
-        with tabs.add_tab("Figures"):
-            figure_panel = FigurePanel(gui, self.data, dispatch)
-        with tabs.add_tab("Layers"):
-            view_list = ViewList(self.server, self._usual_views, up_vector(self.data.scan().up_axis), dispatch)
-            layer_panel = LayerPanel(gui, dispatch, self.scene.facts)
-            camera_colors = CameraColors(gui, self.scene.cameras, dispatch)
-        with tabs.add_tab("Export"):
-            export_panel = ExportPanel(gui, self.export_folder, self.data, dispatch)
-        side = gui.add_panel()
-        with side.add_tab("Frame"):
-            frame_panel = FramePanel(gui, static_file("comparison.html"), self.data, dispatch, self._look_through)
-        with side.add_tab("Problems"):
-            problem_panel = ProblemPanel(gui, self.data, dispatch)
-        with side.add_tab("Help"):
-            self._help = HelpPanel(gui, self._toggle_look)
-        self._panels = (gui.main_panel, side)
-        side.dock_left()
-        side.set_width(430)
-        work = (project_panel, keypoint_panel, loupe_panel, keypoint_files, suggestion_panel, alignment_panel)
-        looks = (
-            method_panel,
-            figure_panel,
-            view_list,
-            layer_panel,
-            camera_colors,
-            export_panel,
-            frame_panel,
-            problem_panel,
+    def _desk(self) -> Desk:
+        return Desk(
+            server=self.server,
+            project=self.project,
+            data=self.data,
+            scene=self.scene,
+            state=self.store.state,
+            dispatch=self.store.dispatch,
+            browser=lambda client_id: self._browsers.get(client_id),
+            open_recording=self._open_recording,
+            toggle_look=self._toggle_look,
+            export_folder=self.export_folder,
         )
-        for panel in (job_bar, self._first_steps, job_logs, history_panel, *work, *looks):
-            self.store.add_view(panel.render)
-
-    def _usual_views(self) -> dict[str, SavedView]:
-        return usual_views(self.data.scan().mesh, self.data.scan().up_axis)
 
     def _routes(self) -> Routes:
         routes = Routes()
@@ -269,8 +205,8 @@ class App:
     async def _connected(self, client: viser.ClientHandle) -> None:
         browser = Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
         self._browsers[client.client_id] = browser
-        self._looks[client.client_id] = look = Look(client, self._panels)
-        self._help.show((self.server.gui, client.gui))
+        self._looks[client.client_id] = look = Look(client, self.panels.handles)
+        self.panels.of(HelpPanel).show((self.server.gui, client.gui))
         look.remember()
         self._visitors.come(client, browser, self.store.state)
 
@@ -288,16 +224,6 @@ class App:
         if look is not None:
             look.toggle()
 
-    def _look_through(self, client_id: int, frame: int) -> None:
-        browser = self._browsers.get(client_id)
-        if browser is not None:
-            browser.look(frame)
-
-    def _go_to(self, client_id: int, in_scan: Point) -> None:
-        browser = self._browsers.get(client_id)
-        if browser is not None:
-            browser.go_to(in_scan)
-
     def _open_recording(self, name: str) -> None:
         try:
             self.project.recording(name)
@@ -305,18 +231,6 @@ class App:
             self.store.dispatch(OpenRecording(name, lambda: self._saver.open(name)))
         except GazelocError as error:
             self.store.dispatch(Notify(Level.ERROR, str(error)))
-
-    def _show_first_pose(self, before: AppState, after: AppState) -> None:
-        """A recording often begins before its first pose: start where there is something to compare."""
-        shown = [(state.recording, state.annotation.alignment, state.annotation.method) for state in (before, after)]
-        is_new = shown[0] != shown[1]
-        if is_new and after.frame == 0:
-            self._go_to_first_pose(after)
-
-    def _go_to_first_pose(self, state: AppState) -> None:
-        trajectory = self.data.trajectory(state.recording, self.data.poses_key(state.recording, state.annotation))
-        if trajectory is not None and trajectory.is_localised.any():
-            self.store.dispatch(BeginAt(int(np.flatnonzero(trajectory.is_localised)[0])))
 
     def _start_job(self, before: AppState, after: AppState) -> None:
         del before
@@ -362,16 +276,3 @@ def _empty_state(project: Project) -> AppState:
     if not names:
         raise ProjectError(f"{project.folder}: the project has no recording; add one with `gazeloc add`.")
     return AppState(names, names[0])
-
-
-def _sources(project: Project) -> Sources:
-    recordings = {name: partial(inputs.load_recording, project, name) for name in project.settings.recordings}
-    tags = {name: partial(_seen_tags, project, name) for name in project.settings.recordings}
-    mesh, display = partial(inputs.load_mesh, project), partial(make_display, project)
-    return Sources(mesh=mesh, recordings=recordings, tags=tags, make_display=display)
-
-
-def _seen_tags(project: Project, recording: str) -> SeenTags:
-    artifact, entry = project.artifact(recording, "tags"), project.settings.tags
-    sightings = inputs.load_sightings(artifact.read_arrays())
-    return SeenTags(sightings, entry.size_m if entry else None)

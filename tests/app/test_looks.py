@@ -10,7 +10,8 @@ from gazeloc_app import looks
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
 from gazeloc_app.looks import Look
-from gazeloc_app.panels.help import WORDS, commands_of
+from gazeloc_app.panels.first_steps import FirstSteps
+from gazeloc_app.panels.help import WORDS, HelpPanel, commands_of
 from viser import ViserServer
 from viser._messages import GuiSetPanelWidthMessage
 from visitor import CAMERA, get, page, until
@@ -54,7 +55,7 @@ def test_so_does_what_belongs_to_one_browser(app):
 
 def test_every_command_is_in_the_help_with_its_key(app):
     def look(client):
-        return [*commands_of(app.server.gui), *commands_of(client.gui)], app._help._keys.content
+        return [*commands_of(app.server.gui), *commands_of(client.gui)], app.panels.of(HelpPanel)._keys.content
 
     commands, text = while_connected(app, look)
     assert ("Ctrl Z", "Undo") in [(key, name.partition(":")[0]) for key, name in commands]
@@ -83,7 +84,7 @@ def test_viser_still_keeps_commands_where_the_help_looks_for_them():
 
 def test_the_first_steps_say_what_comes_next(app):
     def card():
-        return app._first_steps._card
+        return app.panels.of(FirstSteps)._card
 
     assert "Align.</b>" in card().content
     assert "✓ Process" in card().content

@@ -8,6 +8,7 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
+from gazeloc_app.state import AppState
 
 MOUSE = (
     ("drag", "turn the view"),
@@ -46,6 +47,9 @@ class HelpPanel:
         self._keys = gui.add_html("")
         widgets.on_user(self._look, lambda event: toggle_look(event.client_id), event="on_click")
         self.show((gui,))
+
+    def render(self, state: AppState) -> None:
+        """Nothing of the help depends on the state."""
 
     def show(self, guis: Iterable[GuiApi]) -> None:
         """List the commands of these."""
