@@ -7,15 +7,16 @@ where it matters, at the cameras (first-order propagation of the keypoints' erro
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats, Ints
 from gazeloc_core.correspondences import Correspondences
+from gazeloc_core.left_out import leave_one_out
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import leave_one_out, principal_extents, residuals, similarity_jacobian
+from gazeloc_core.similarity_fit import principal_extents, residuals, similarity_jacobian
 from gazeloc_core.transforms import Similarity
 
 Level = Literal["good", "warning", "bad"]
@@ -101,7 +102,9 @@ class Evidence:
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object that `from_json` reads."""
-        return asdict(self)
+        geometry = None if self.geometry is None else dict(vars(self.geometry))
+        points, verdicts = ([dict(vars(one)) for one in many] for many in (self.keypoints, self.verdicts))
+        return {**vars(self), "keypoints": points, "geometry": geometry, "verdicts": verdicts}
 
     @classmethod
     def from_json(cls, value: dict[str, Any]) -> Evidence:
@@ -134,7 +137,7 @@ def measure(
     """The evidence on an alignment at K pairs, of which `inlier` (K,) agree, without verdicts yet."""
     distance = residuals(scan_from_sfm, pairs)
     pixels = np.full(len(pairs), np.nan) if model is None else reprojection_px(scan_from_sfm, pairs, model)
-    left_out = leave_one_out_residuals(pairs, inlier) if is_fitted else np.full(len(pairs), np.nan)
+    left_out = leave_one_out(pairs, inlier).residuals() if is_fitted else np.full(len(pairs), np.nan)
     keypoints = tuple(
         KeypointEvidence(
             pairs.names[i],
@@ -154,16 +157,6 @@ def measure(
         tag_scale=_tag_scale(pairs.sfm * scan_from_sfm.scale, pairs, tag_size_m),
         scan_tag_scale=_tag_scale(pairs.scan, pairs, tag_size_m),
     )
-
-
-def leave_one_out_residuals(pairs: Correspondences, inlier: Bools) -> Floats:
-    """(K,) distance in metres of each pair under the alignment fitted to the inliers of all other groups, or NaN."""
-    left_out = np.full(len(pairs), np.nan)
-    for group, fit in enumerate(leave_one_out(pairs, inlier)):
-        if fit is not None:
-            members = pairs.of_group(group)
-            left_out[members] = residuals(fit, pairs.take(members))
-    return left_out
 
 
 def reprojection_px(scan_from_sfm: Similarity, pairs: Correspondences, model: SfmModel, nearest: int = 10) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats
 from gazeloc_core.correspondences import Correspondences
+from gazeloc_core.left_out import leave_one_out
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import leave_one_out, residuals
 from gazeloc_core.transforms import Similarity
 
 
@@ -29,17 +29,13 @@ def pair_effects(
     scan_from_sfm: Similarity, pairs: Correspondences, inlier: Bools, model: SfmModel | None
 ) -> PairEffects:
     """The effects under an alignment fitted to the inliers (K,) of the pairs; without a model no camera moves."""
-    count = len(pairs.group_names)
-    left_out, moved = np.full(count, np.nan), np.full(count, np.nan)
+    fits, count = leave_one_out(pairs, inlier), len(pairs.group_names)
+    squares = np.bincount(pairs.group_index, weights=fits.residuals() ** 2, minlength=count)
+    left_out = np.sqrt(squares / np.bincount(pairs.group_index, minlength=count))
+    takes_part = np.bincount(pairs.group_index, weights=inlier, minlength=count) > 0
+    moved = np.where(fits.is_determined & ~takes_part, 0.0, np.nan)
     centres = np.zeros((0, 3)) if model is None else np.asarray(model.sfm_from_camera.translation).reshape(-1, 3)
     here = scan_from_sfm.apply(centres)
-    for group, fit in enumerate(leave_one_out(pairs, inlier)):
-        if fit is None:
-            continue
-        members = pairs.of_group(group)
-        left_out[group] = np.sqrt(np.mean(residuals(fit, pairs.take(members)) ** 2))
-        if not (inlier & members).any():
-            moved[group] = 0.0
-        elif len(centres):
-            moved[group] = np.linalg.norm(fit.apply(centres) - here, axis=1).mean()
+    for group in np.flatnonzero(fits.is_determined & takes_part).tolist() if len(centres) else ():
+        moved[group] = np.linalg.norm(fits.apply(group, centres) - here, axis=1).mean()
     return PairEffects(left_out, moved)

@@ -20,8 +20,6 @@ from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.transforms import Similarity
 
-_NO_WEIGHT = 1e-300
-"""Of pairs that are left out: nothing, but a sum of none of them can still be divided by."""
 COLLINEAR_RATIO = 0.02
 """Second to first singular value of centred points below which they count as lying on one line."""
 
@@ -105,7 +103,7 @@ def check_geometry(pairs: Correspondences) -> None:
             "click more pairs, or record and scan more tags."
         )
     for points, side in ((pairs.scan, "scan"), (pairs.sfm, "reconstruction")):
-        if _determines(points, np.ones(len(points), dtype=np.bool_)):
+        if determines(points, np.ones(len(points), dtype=np.bool_)):
             continue
         extents = principal_extents(points)
         resolution = max(float(extents[0]), 1e-12 * float(np.abs(points).max(initial=1.0))) * 1e-4
@@ -121,7 +119,7 @@ def check_geometry(pairs: Correspondences) -> None:
         )
 
 
-def _determines(points: Floats, kept: Bools) -> Bools:
+def determines(points: Floats, kept: Bools) -> Bools:
     """(...) whether the `kept` (..., K) of points (K, 3) lie at three places at least, and not on one line."""
     count = kept.sum(axis=-1)
     if points.shape[0] < 3:
@@ -136,7 +134,7 @@ def _determines(points: Floats, kept: Bools) -> Bools:
 def is_degenerate(pairs: Correspondences) -> bool:
     """Whether `check_geometry` refuses the pairs."""
     everything = np.ones(len(pairs), dtype=np.bool_)
-    return not all(bool(_determines(side, everything)) for side in (pairs.scan, pairs.sfm))
+    return not all(bool(determines(side, everything)) for side in (pairs.scan, pairs.sfm))
 
 
 def similarity_jacobian(points_in_scan: Floats, centre: Floats) -> Floats:
@@ -186,18 +184,6 @@ def robust_fit(pairs: Correspondences, options: RobustOptions | None = None) -> 
         kept = pairs.take(inlier)
         return RobustFit(fit_similarity(kept.sfm, kept.scan, kept.weights), inlier, is_contradictory=False)
     return RobustFit(all_fitted, everything, is_contradictory=True)
-
-
-def leave_one_out(pairs: Correspondences, inlier: Bools) -> tuple[Similarity | None, ...]:
-    """For each group the similarity fitted without it, None where the rest does not determine one."""
-    kept = inlier & (np.arange(len(pairs.group_names))[:, None] != pairs.group_index)
-    is_determined = _determines(pairs.scan, kept) & _determines(pairs.sfm, kept)
-    scale, rotation, shift = solve_umeyama(pairs.sfm, pairs.scan, np.where(kept, pairs.weights, _NO_WEIGHT))
-    turns = Rotation.from_matrix(np.where(is_determined[:, None, None], rotation, np.eye(3)))
-    return tuple(
-        Similarity(float(scale[group]), turns[group], shift[group]) if is_determined[group] else None
-        for group in range(len(kept))
-    )
 
 
 def _best_proposals(pairs: Correspondences, options: RobustOptions, count: int = 10) -> list[Floats]:

@@ -15,7 +15,8 @@ from gazeloc_core.correspondences import Correspondences, gather
 from gazeloc_core.errors import GeometryError, ProjectError
 from gazeloc_core.evidence import reprojection_px
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
-from gazeloc_core.similarity_fit import fit_similarity, leave_one_out, solve_umeyama
+from gazeloc_core.left_out import leave_one_out
+from gazeloc_core.similarity_fit import fit_similarity, residuals, solve_umeyama
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 
@@ -180,11 +181,13 @@ def test_one_wrong_click_of_four_is_noticed_but_nobody_is_blamed():
 
 def test_leave_one_out_is_the_fit_to_the_others():
     pairs = clicked(CORNERS_OF_ROOM, noise_m=0.02)
-    for i, fit in enumerate(leave_one_out(pairs, np.ones(6, bool))):
+    fits = leave_one_out(pairs, np.ones(6, bool))
+    assert fits.is_determined.all()
+    for i in range(6):
         others = np.arange(6) != i
         expected = fit_similarity(pairs.sfm[others], pairs.scan[others])
-        assert fit is not None
-        np.testing.assert_allclose(fit.as_matrix(), expected.as_matrix(), atol=1e-12)
+        np.testing.assert_allclose(fits.apply(i, pairs.sfm), expected.apply(pairs.sfm), atol=1e-12)
+        np.testing.assert_allclose(fits.residuals()[i], residuals(expected, pairs)[i], atol=1e-12)
 
 
 def test_leave_one_out_predicts_new_keypoints_where_residuals_flatter():
