@@ -29,7 +29,7 @@ def test_every_place_on_the_ray_of_a_click_is_on_its_line(camera):
         assert np.linalg.norm(line - expected, axis=1).min() < gaps
         nearest = np.argsort(np.linalg.norm(line - expected, axis=1))[:2]
         a, b = line[nearest]
-        across = abs(np.cross(b - a, expected - a)) / np.linalg.norm(b - a)
+        across = abs(np.linalg.det([b - a, expected - a])) / np.linalg.norm(b - a)
         assert across < (1e-6 if camera.is_pinhole else 0.1)
 
 

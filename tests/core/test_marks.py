@@ -65,7 +65,7 @@ def test_marks_reach_the_exports(tmp_path):
     project.save_marks("walk", marked((4, Mark.BAD, NOTE)))
     for format in ("csv", "nerfstudio"):
         export(project, format=format, output=tmp_path / format, recording="walk")
-    table = pd.read_csv(tmp_path / "csv" / "poses.csv").fillna("")
+    table = pd.read_csv(tmp_path / "csv" / "poses.csv", dtype={"mark": str, "note": str}, keep_default_na=False)
     assert table.loc[table["mark"] != "", ["frame index", "mark", "note"]].values.tolist() == [[4, "bad", NOTE]]
     frames = json.loads((tmp_path / "nerfstudio" / "transforms.json").read_text())["frames"]
     assert [(f["frame_index"], f["mark"], f["note"]) for f in frames if "mark" in f] == [(4, "bad", NOTE)]
