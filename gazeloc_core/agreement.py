@@ -25,6 +25,8 @@ from gazeloc_core.render import RayRenderer
 from gazeloc_core.scan import Mesh
 
 Picture = NDArray[np.float32]
+LOW_SCORE = 0.3
+"""A frame that scores below this looks more than 0.75° off the scan, or has little in common with it."""
 _MIN_TILES = 12
 _ROUNDS = 10
 

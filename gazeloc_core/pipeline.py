@@ -15,6 +15,7 @@ from gazeloc_core.stage_list import SCORES, STAGES, Stage, stage_named
 from gazeloc_core.stages.evaluation import evaluate_project, evaluate_recording, verdicts
 from gazeloc_core.stages.exports import FORMATS, export
 from gazeloc_core.stages.poses import methods_with_poses
+from gazeloc_core.stages.scores import FrameScores, load_scores
 
 __all__ = [
     "FORMATS",
@@ -26,6 +27,7 @@ __all__ = [
     "run",
     "run_after_choice",
     "run_stage",
+    "score",
     "stage_named",
     "statuses",
     "verdicts",
@@ -121,6 +123,19 @@ def run_after_choice(project: Project, recording: str, method: Method, report: R
     for number, name in enumerate(names):
         share = part(report, number / len(names), (number + 1) / len(names))
         run_stage(project, stage_named(name, method=method), recording, share)
+
+
+def score(project: Project, recording: str, method: Method = Method.SFM, report: Report = silent) -> FrameScores:
+    """Score every frame that has a pose by a method, after the poses of what is chosen; see `stages.scores`.
+
+    Raises:
+        GazelocError: what a stage raised, as where the recording was not run yet.
+    """
+    run_after_choice(project, recording, method, part(report, 0, 0.05))
+    stage = SCORES[method]
+    run_stage(project, stage, recording, part(report, 0.05, 1))
+    frames = project.result(recording, method, "trajectory").header().stats["frames"]
+    return load_scores(stage.artifact(project, recording), frames)
 
 
 def run_stage(project: Project, stage: Stage, name: str | None, report: Report = silent) -> StageTime:

@@ -1,9 +1,12 @@
-"""What commands of the command line take: kinds of arguments with their help, and how a command waits for its run."""
+"""What commands of the command line take: kinds of arguments with their help, how a command waits for its run, and
+what is said of arguments that are none.
+"""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,3 +50,22 @@ def deferred(command: Callable[..., None]) -> Callable[..., Command]:
         return functools.partial(command, *values, **named)
 
     return bind
+
+
+def in_one_line(box: str, arguments: list[str], commands: Collection[str]) -> str:
+    """What a box of tyro's says up to its first rule, and where there is help."""
+    rows = [re.sub(r"\x1b\[[0-9;]*m", "", row).strip("│ ") for row in box.splitlines()]
+    rows = [row for row in rows if row and row[0] not in "╭╰"]
+    end = next((i for i, row in enumerate(rows) if row.startswith("──")), len(rows))
+    text = " ".join(rows[:end]).replace("(required)", "").replace(". Expected 1 values", "").rstrip(" .")
+    if found := re.match(r"Error parsing (--[a-z-]+)", text):  # paths and texts parse always, so it is a number
+        text = f"{found[1]} {_value_of(found[1], arguments)}: this is not a number that it can take"
+    named = next((word for word in arguments if word in commands), None)
+    return f"{text}; see `gazeloc {named} --help`." if named else f"{text}; see `gazeloc --help`."
+
+
+def _value_of(flag: str, arguments: list[str]) -> str:
+    for position, word in enumerate(arguments[:-1]):
+        if word == flag:
+            return arguments[position + 1]
+    return next((word.split("=", 1)[1] for word in arguments if word.startswith(f"{flag}=")), "")

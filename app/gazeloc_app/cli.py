@@ -1,5 +1,5 @@
-"""The command line: `gazeloc new | add | run | view | status | evaluate | protocol | keypoints | export | tags |
-advise | demo`.
+"""The command line: `gazeloc new | add | run | view | status | evaluate | score | protocol | keypoints | export |
+tags | advise | demo`.
 
 Every command calls the same functions as the app. What a user can mend is one sentence on standard error and exit
 code 2; a fault of ours is a traceback and exit code 1. Results go to standard output, progress to standard error.
@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import re
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -30,6 +29,7 @@ from gazeloc_app.arguments import (
     Project,
     TagSize,
     deferred,
+    in_one_line,
 )
 from gazeloc_app.door.address import check_address
 from gazeloc_core import __version__
@@ -179,6 +179,31 @@ def evaluate(
 
 
 @deferred
+def score(
+    project: Project,
+    *,
+    method: OptionalName = None,
+    recording: OptionalName = None,
+    worst: int = 10,
+    json: Flag = False,
+) -> None:
+    """Say how well each frame agrees with the scan seen from its pose, and which frames do so least. Needs no truth.
+
+    Compares every frame that has a pose, a fraction of a second each. A run that was stopped goes on where it was.
+
+    Args:
+        project: The project folder.
+        method: By whose poses; by default the method chosen in the app, else sfm.
+        recording: Only this recording; by default all.
+        worst: How many of the worst frames to list.
+        json: Print one JSON object instead of tables.
+    """
+    from gazeloc_app.frames import score_command
+
+    score_command.score(project, method=method, recording=recording, worst=worst, as_json=json)
+
+
+@deferred
 def protocol(
     project: Project,
     *,
@@ -320,6 +345,7 @@ COMMANDS: dict[str, Any] = {
     "view": view,
     "status": status,
     "evaluate": evaluate,
+    "score": score,
     "protocol": protocol,
     "export": export,
     "keypoints": keypoints,
@@ -369,25 +395,6 @@ def _parsed(arguments: list[str]) -> Command:
             )
     except SystemExit as stop:
         if stop.code:
-            raise InputError(_in_one_line(said.getvalue(), arguments)) from None
+            raise InputError(in_one_line(said.getvalue(), arguments, COMMANDS)) from None
         raise
     return command
-
-
-def _in_one_line(box: str, arguments: list[str]) -> str:
-    """What a box of tyro's says up to its first rule, and where there is help."""
-    rows = [re.sub(r"\x1b\[[0-9;]*m", "", row).strip("│ ") for row in box.splitlines()]
-    rows = [row for row in rows if row and row[0] not in "╭╰"]
-    end = next((i for i, row in enumerate(rows) if row.startswith("──")), len(rows))
-    text = " ".join(rows[:end]).replace("(required)", "").replace(". Expected 1 values", "").rstrip(" .")
-    if found := re.match(r"Error parsing (--[a-z-]+)", text):  # paths and texts parse always, so it is a number
-        text = f"{found[1]} {_value_of(found[1], arguments)}: this is not a number that it can take"
-    named = next((word for word in arguments if word in COMMANDS), None)
-    return f"{text}; see `gazeloc {named} --help`." if named else f"{text}; see `gazeloc --help`."
-
-
-def _value_of(flag: str, arguments: list[str]) -> str:
-    for position, word in enumerate(arguments[:-1]):
-        if word == flag:
-            return arguments[position + 1]
-    return next((word.split("=", 1)[1] for word in arguments if word.startswith(f"{flag}=")), "")

@@ -34,6 +34,11 @@ class FrameScores:
     score: Floats
     offset_deg: Floats
 
+    @property
+    def known(self) -> Floats:
+        """The scores (K,) of the frames that have one."""
+        return self.score[np.isfinite(self.score)]
+
 
 def score_frames(
     project: Project,
@@ -94,7 +99,7 @@ def load_scores(artifact: Artifact, count: int) -> FrameScores:
 
 
 def _stats(scores: FrameScores, has_pose: Bools) -> Mapping[str, float | int]:
-    known = scores.score[np.isfinite(scores.score)]
+    known = scores.known
     counts: dict[str, float | int] = {"frames with a pose": int(has_pose.sum()), "scored": len(known)}
     return counts | ({"median": round(float(np.median(known)), 4)} if len(known) else {})
 

@@ -9,15 +9,19 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from app_project import FRAMES
 from data import CHECKOUT
 from fake_project import CLICKED, click, contents
 from gazeloc_app.cli import main
 from tiny_arkitscenes import write_arkitscenes
 from tiny_captures import write_scan
 
-from gazeloc_core import __version__
+from gazeloc_core import __version__, pipeline
+from gazeloc_core.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.project import Project
+from gazeloc_core.stages.registration import align_keypoints
 
 OPTIONS = {
     "new": ["--scan", "--recording", "--colmap", "--truth", "--tag-family", "--tag-size"],
@@ -26,6 +30,7 @@ OPTIONS = {
     "view": ["--port"],
     "status": ["--json"],
     "evaluate": ["--truth", "--recording", "--json"],
+    "score": ["--method", "--recording", "--worst", "--json"],
     "protocol": ["--scan", "--every", "--share", "--seed", "--tag-family", "--tag-size"],
     "export": ["--format", "--output"],
     "tags": ["print", "--ids", "--size", "--output", "--family", "--paper"],
@@ -161,6 +166,23 @@ def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):
     words = ["evaluate", home / "aligned", "--truth", home / "shifted.tum", "--recording", "walk", "--json"]
     value = json.loads(answer(capsys, *words))
     assert value["walk"]["sfm"]["position_m"]["mean"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_score_lists_the_frames_that_agree_least(capsys, project: Project):
+    align_keypoints(project, "walk")
+    project.save_marks("walk", FrameMarks().put(FrameMark(3, Mark.BAD, "too far left")))
+    value = json.loads(answer(capsys, "score", project.folder, "--json", "--worst", 99))["walk"]["sfm"]
+    scores = pipeline.score(project, "walk")
+    assert (value["frames"], value["with_a_pose"], value["scored"]) == (FRAMES, 15, 15)
+    assert value["median"] == np.nanmedian(scores.score)
+    assert [row["frame_index"] for row in value["worst"]] == np.argsort(scores.score)[:15].tolist()
+    summary, worst = answer(capsys, "score", project.folder, "--worst", 15).split("\n\n")
+    assert summary.splitlines()[2].split()[:5] == ["walk", "sfm", str(FRAMES), "15", "15"]
+    rows = {row.split()[0]: row.split(maxsplit=6) for row in worst.splitlines()[3:]}
+    assert len(rows) == 15
+    assert rows["3"][4:] == ["registered" if 3 % 2 == 0 else "interpolated", "bad", "too far left"]
+    assert float(rows["3"][2]) == pytest.approx(scores.score[3], abs=0.005)
+    assert "agree least" not in answer(capsys, "score", project.folder, "--worst", 0)
 
 
 def test_an_arkitscenes_video_can_be_the_scan(capsys, home: Path):

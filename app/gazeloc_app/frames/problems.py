@@ -8,12 +8,10 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Bools, Floats
 from gazeloc_core.marks import FrameMarks, Mark
 from gazeloc_core.trajectory import Trajectory
-
-LOW_SCORE = 0.3
-"""A frame that scores below this looks more than 0.75° off the scan, or has little in common with it."""
 
 
 class Problem(StrEnum):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazeloc_app import widgets
-from gazeloc_app.frames.problems import LOW_SCORE
+from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Floats
 from gazeloc_core.marks import FrameMarks, Mark
 from gazeloc_core.trajectory import PoseStatus, Trajectory

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from gazeloc_app.state import Level
 from gazeloc_app.work.jobs import Outcome
 from gazeloc_core import pipeline
@@ -80,13 +82,10 @@ def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, 
 def score_frames(folder: Path, report: Report, *, recording: str, method: Method = Method.SFM) -> Outcome:
     """How well each frame agrees with the render of the scan from its pose, after the poses of what is chosen."""
     project = Project.open(folder)
-    pipeline.run_after_choice(project, recording, method, part(report, 0, 0.05))
-    stage = pipeline.SCORES[method]
-    pipeline.run_stage(project, stage, recording, part(report, 0.05, 1))
-    stats = stage.artifact(project, recording).header().stats
-    if not stats["scored"]:
+    score = pipeline.score(project, recording, method, report).known
+    if not len(score):
         return Outcome("No frame could be scored: none has a pose and enough of the scan in view.", Level.WARNING)
-    return Outcome(f"{stats['scored']} frames were scored; the median agreement is {stats['median']:.2f}.")
+    return Outcome(f"{len(score)} frames were scored; the median agreement is {np.median(score):.2f}.")
 
 
 def draw_figures(folder: Path, report: Report, *, recording: str) -> Outcome:
