@@ -19,7 +19,7 @@ from gazeloc_app.state import Level
 from gazeloc_core.keypoint_files import WRITERS, read_keypoints
 from gazeloc_core.project import Project
 
-LIST = b"R0,1,2,0.5\nR1,0.5,0.25,2\n"
+LIST = b"lamp,1,2,0.5\ndesk,0.5,0.25,2\n"
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_reading_a_list_is_one_step_and_is_saved(app, panel):
     step(app, PickPoint(Side.SCAN, (1, 1, 1)))
     panel._read(SimpleNamespace(name="picked.txt", content=LIST))
     app.store.step()
-    assert [pair.name for pair in app.project.keypoints("walk")] == ["Keypoint 1", "R0", "R1"]
+    assert [pair.name for pair in app.project.keypoints("walk")] == ["Keypoint 1", "lamp", "desk"]
     assert "2 of them new" in app.store.state.notice.text
     step(app, Undo())
     assert [pair.name for pair in app.project.keypoints("walk")] == ["Keypoint 1"]

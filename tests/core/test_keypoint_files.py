@@ -47,8 +47,12 @@ def test_lists_of_one_side_put_together_are_the_pairs(side):
     [
         ("1,2,3\n4,5,6\n", ["Point 1", "Point 2"]),
         ("0,1,2,3\n7,4,5,6\n", ["Point 0", "Point 7"]),
-        ("R0,1,2,3\nR1,4,5,6\n", ["R0", "R1"]),
-        ("12,R0,1,2,3\n99,R1,4,5,6\n", ["R0", "R1"]),
+        ("R0,1,2,3\nR1,4,5,6\n", ["Pair 0", "Pair 1"]),
+        ("12,A0,1,2,3\n99,A1,4,5,6\n", ["Pair 0", "Pair 1"]),
+        ("A0,1,2,3\nR0,4,5,6\n", ["A0", "R0"]),
+        ("lamp,1,2,3\nR0,4,5,6\n", ["lamp", "R0"]),
+        ("name,x,y,z\nlamp,1,2,3\ndesk,4,5,6\n", ["lamp", "desk"]),
+        ("name;X (m);Y (m);Z (m)\nlamp;1;2;3\ndesk;4;5;6\n", ["lamp", "desk"]),
         ("// picked\n1 2 3\n\n4\t5\t6\n", ["Point 1", "Point 2"]),
     ],
 )
@@ -58,16 +62,53 @@ def test_every_form_of_cloudcompares_list_is_read(text, names):
 
 
 def test_what_is_read_completes_pairs_of_the_same_name_and_is_added_else_and_twice_is_once():
-    scan = read_keypoints("scan.txt", b"R0,1,2,3\nR1,4,5,6\n", "scan")
-    sfm = read_keypoints("sfm.txt", b"R1,7,8,9\nR2,1,1,1\n", "sfm")
+    scan = read_keypoints("scan.txt", b"lamp,1,2,3\ndesk,4,5,6\n", "scan")
+    sfm = read_keypoints("sfm.txt", b"desk,7,8,9\ndoor,1,1,1\n", "sfm")
     both = merged(merged(PAIRS, scan), sfm)
     assert both.pairs[:3] == PAIRS.pairs
     assert [(p.key, p.name, p.scan, p.sfm) for p in both.pairs[3:]] == [
-        ("k4", "R0", (1, 2, 3), None),
-        ("k5", "R1", (4, 5, 6), (7, 8, 9)),
-        ("k6", "R2", None, (1, 1, 1)),
+        ("k4", "lamp", (1, 2, 3), None),
+        ("k5", "desk", (4, 5, 6), (7, 8, 9)),
+        ("k6", "door", None, (1, 1, 1)),
     ]
     assert merged(merged(both, scan), sfm) == both
+
+
+def test_the_two_sides_that_cloudcompare_numbers_are_one_pair():
+    scan = read_keypoints("ref.txt", b"R0,1,2,3\nR1,4,5,6\n", "scan")
+    sfm = read_keypoints("aligned.txt", b"A0,7,8,9\nA1,1,1,1\n", "sfm")
+    both = merged(scan, sfm)
+    assert [(p.name, p.scan, p.sfm) for p in both] == [
+        ("Pair 0", (1, 2, 3), (7, 8, 9)),
+        ("Pair 1", (4, 5, 6), (1, 1, 1)),
+    ]
+
+
+CONSOLE = """[22:21:08] [PointPairRegistration] RMS: 0.31
+[22:21:09] ; Ref.name; Ref.x; Ref.y; Ref.z; Aligned.name; Aligned.x; Aligned.y; Aligned.z; Delta X; Delta Y; Distance
+[22:21:09] ;R0; 558.046; 486.641; 0.939167; A0; 558.482; 486.44; 1.17604; 0.436218; -0.201324; 0.535657
+[22:21:09] ;R1; 562.469; 525.639; 1.13067; A1; 562.77; 525.501; 1.36213; 0.301514; -0.138184; 0.404454
+[22:21:12] Saved, and a; semicolon
+"""
+
+
+@pytest.mark.parametrize("side", ["scan", "sfm"])
+def test_cloudcompares_table_of_pairs_gives_the_side_that_was_not_moved(side):
+    read = read_keypoints("console.txt", CONSOLE.encode(), side)
+    assert [(p.name, getattr(p, side)) for p in read] == [
+        ("Pair 0", (558.046, 486.641, 0.939167)),
+        ("Pair 1", (562.469, 525.639, 1.13067)),
+    ]
+    other = "sfm" if side == "scan" else "scan"
+    assert all(getattr(pair, other) is None for pair in read)  # printed as it lies after the alignment
+
+
+def test_a_table_of_pairs_that_were_not_moved_gives_both_sides():
+    text = "ID, ref_X, ref_Y, ref_Z, align_X, align_Y, align_Z\nP01, 1, 2, 3, 4, 5, 6\n"
+    (pair,) = read_keypoints("homologous.txt", text.encode(), "scan")
+    assert (pair.name, pair.scan, pair.sfm) == ("P01", (1, 2, 3), (4, 5, 6))
+    (pair,) = read_keypoints("homologous.txt", text.encode(), "sfm")
+    assert (pair.scan, pair.sfm) == ((4, 5, 6), (1, 2, 3))
 
 
 @pytest.mark.parametrize(
@@ -93,6 +134,12 @@ def test_what_is_read_completes_pairs_of_the_same_name_and_is_added_else_and_twi
         (b"1,2,3\n" * 5001, "5001"),
         (b"1" * 4_000_001, "MB"),
         (b"[" * 100_000, "JSON"),
+        (b"name,x,y,z\n", "no keypoint"),
+        (b"a,1,2,3\nname,x,y,z\n", "line 2"),
+        (CONSOLE.split("\n[22:21:09] ;R0")[0].encode(), "no keypoint"),
+        (CONSOLE.replace("486.641", "west").encode(), "line 3"),
+        (CONSOLE.replace("; 558.046", "").replace("; A0; 558.482; 486.44; 1.17604", "").encode(), "line 3"),
+        (CONSOLE.replace("558.046", "inf").encode(), "no place"),
     ],
 )
 def test_a_bad_file_is_one_sentence_with_its_name(content, said):

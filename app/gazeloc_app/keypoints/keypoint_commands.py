@@ -6,7 +6,8 @@ from pathlib import Path
 
 from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.files import write_text_atomically
-from gazeloc_core.keypoint_files import WRITERS, SideName, merged, read_keypoints
+from gazeloc_core.keypoint_cells import SideName
+from gazeloc_core.keypoint_files import WRITERS, merged, read_keypoints
 from gazeloc_core.project import Project
 from gazeloc_core.user_files import read_bytes
 

@@ -13,7 +13,8 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.files import ImportKeypoints
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.errors import InputError
-from gazeloc_core.keypoint_files import WRITERS, SideName, read_keypoints
+from gazeloc_core.keypoint_cells import SideName
+from gazeloc_core.keypoint_files import WRITERS, read_keypoints
 
 SIDES: dict[str, SideName] = {"the scan": "scan", "the reconstruction": "sfm"}
 FORMATS = {
@@ -35,10 +36,12 @@ class KeypointFiles:
             self._side = gui.add_dropdown(
                 "Lists are of",
                 tuple(SIDES),
-                hint="Lists of CloudCompare and Stray hold one side. Pairs of the same name get it, others are added.",
+                hint="Lists of CloudCompare and Stray hold one side; in tables of pairs it is the reference's. Pairs of the "
+                "same name get it, others are added.",
             )
             self._upload: Any = gui.add_upload_button(
-                "Read keypoints", hint="JSON, CSV, a list picked in CloudCompare, Stray's keypoints.json. One undo."
+                "Read keypoints",
+                hint="JSON, CSV, CloudCompare's picked list or table of pairs, Stray's keypoints.json. One undo.",
             )
             self._format = gui.add_dropdown("Format", tuple(FORMATS), hint="Of the file that is saved.")
             self._save = gui.add_button("Save keypoints", color="gray", hint="Saves a file on your computer.")
