@@ -34,7 +34,7 @@ _NAMES = ("ref.name", "name", "id", "label", "ref_name")
 class _Columns(NamedTuple):
     """Where the columns of a table of pairs are; `aligned` is None where it holds no places of the aligned cloud."""
 
-    count: int
+    least: int
     name: int | None
     reference: tuple[int, ...]
     aligned: tuple[int, ...] | None
@@ -59,7 +59,8 @@ def from_table_of_pairs(file: str, text: str, side: SideName) -> list[KeypointPa
     Raises:
         InputError: with the line, if it is garbled.
     """
-    columns, pairs = None, []
+    columns: _Columns | None = None
+    pairs: list[KeypointPair] = []
     for number, line in enumerate(text.splitlines(), start=1):
         cells = _cells(line)
         if columns is None or not any(cells):
@@ -67,8 +68,8 @@ def from_table_of_pairs(file: str, text: str, side: SideName) -> list[KeypointPa
             continue
         if _TIME.match(line) and not _TIME.sub("", line).lstrip().startswith(";"):
             continue  # something else that the console says
-        if len(cells) < columns.count:
-            raise InputError.of(file, f"line {number} has {len(cells)} values, the header {columns.count}", REMEDY)
+        if len(cells) < columns.least:
+            raise InputError.of(file, f"line {number} has {len(cells)} values, the header {columns.least}", REMEDY)
         label = cells[columns.name] if columns.name is not None else ""
         reference = point_of(file, f"line {number}", [cells[i] for i in columns.reference])
         pair = one_sided(name_of(_numbered(label), f"Point {len(pairs) + 1}"), reference, side)

@@ -36,8 +36,8 @@ class KeypointFiles:
             self._side = gui.add_dropdown(
                 "Lists are of",
                 tuple(SIDES),
-                hint="Lists of CloudCompare and Stray hold one side; in tables of pairs it is the reference's. Pairs of the "
-                "same name get it, others are added.",
+                hint="Lists of CloudCompare and Stray hold one side; in tables of pairs it is the reference's. "
+                "Pairs of the same name get it, others are added.",
             )
             self._upload: Any = gui.add_upload_button(
                 "Read keypoints",
