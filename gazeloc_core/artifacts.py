@@ -69,6 +69,10 @@ class Artifact:
     def _failure(self) -> Path:
         return self.folder.with_name(f"{self.folder.name}.failed.json")
 
+    def stamp(self) -> tuple[tuple[int, int] | None, ...]:
+        """Tells what is there from what was there before without reading it: both files are replaced as a whole."""
+        return tuple(_stamp_of(path) for path in (self.folder / HEADER, self._failure))
+
     def header(self) -> Header:
         """What the artifact says about itself.
 
@@ -172,3 +176,11 @@ class Artifact:
 def _save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     keywords: dict[str, Any] = dict(arrays)
     np.savez_compressed(path, **keywords)
+
+
+def _stamp_of(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_ino

@@ -85,7 +85,7 @@ class App:
             self.data = ProjectData(project, self._say_damage)
             self.data.scan()
             self._saver = Saver(project, self._say_damage)
-            self._job_list = JobList(project, self._say_damage)
+            self._job_list = JobList(project, self.export_folder, self._say_damage)
             self._views = ViewSaver(project.folder, self._say_damage)
             first = replace(self.store.state, views=self._views.read())
             self.store.begin(self._saver.open(first.recording).put_into(first))

@@ -76,6 +76,11 @@ class Job:
     number: int = 0
     """Counts the jobs of a session, so that one can be told from the next of the same name."""
 
+    @property
+    def recording(self) -> str | None:
+        """The recording that it is about, None for the scan."""
+        return dict(self.keywords).get("recording")
+
     def is_same_work(self, other: Job) -> bool:
         """Whether the other does the very same."""
         return (self.task, self.keywords) == (other.task, other.keywords)
@@ -89,6 +94,7 @@ class EndedJob:
     notice: Notice
     log: tuple[str, ...]
     number: int
+    recording: str | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +123,22 @@ class Annotation:
     """Whose poses are shown and exported."""
     marks: FrameMarks = field(default_factory=FrameMarks)
     """What people think of frames' poses."""
+
+    def with_suggested(self, suggested: SuggestedAlignment) -> Annotation:
+        """With an alignment that a job suggests; one of a run never replaces one that a person chose."""
+        is_free = suggested.by_person or not self.alignment_by_person
+        if not is_free or suggested.key == self.alignment:
+            return self
+        return replace(self, alignment=suggested.key, alignment_by_person=suggested.by_person)
+
+
+@dataclass(frozen=True)
+class SuggestedAlignment:
+    """An alignment that a job suggests to put in force."""
+
+    recording: str
+    key: str
+    by_person: bool
 
 
 @dataclass(frozen=True)
@@ -188,6 +210,8 @@ class AppState:
     """The last ones of this session, the newest first."""
     offered_jobs: tuple[Job, ...] = ()
     """What was under way when GazeLoc ended the last time; begun only when somebody says so."""
+    suggested: tuple[SuggestedAlignment, ...] = ()
+    """By jobs about recordings that are not open: a step of theirs, on the disk already (annotation/saving.py)."""
     jobs_started: int = 0
     people: tuple[Person, ...] = ()
     """Who is here, by number."""
@@ -203,8 +227,12 @@ class AppState:
         return (() if self.job is None else (self.job,)) + self.waiting_jobs
 
     def has_job(self, name: str) -> bool:
-        """Whether long work of this name runs or waits."""
-        return any(job.name == name for job in self.jobs)
+        """Whether long work of this name runs or waits, about the recording that is open or about the scan."""
+        return any(job.name == name and job.recording in (None, self.recording) for job in self.jobs)
+
+    def job_title(self, job: Job | EndedJob) -> str:
+        """A job's name, with its recording where that is not the one that is open."""
+        return job.name if job.recording in (None, self.recording) else f"{job.name} ({job.recording})"
 
     def annotate(self, annotation: Annotation) -> AppState:
         """With a new annotation that can be undone; the redo list is cut, as everywhere."""

@@ -175,15 +175,6 @@ class TestTwoRecordings:
         assert [pair.scan for pair in project.keypoints("walk")] == [(1, 1, 0)]
         assert [pair.scan for pair in project.keypoints("sit")] == [(2, 1, 0)]
 
-    def test_none_is_opened_while_a_job_is_about_the_other(self, app):
-        (dropdown,) = widgets(app, "Recording")
-        step(app, StartJob("Align", _never))
-        send(app, dropdown, "sit")
-        step(app)
-        assert app.store.state.recording == "walk"
-        assert "still running" in app.store.state.notice.text
-        assert dropdown.value == "walk"
-
 
 def test_a_full_disk_is_said_and_the_click_is_saved_once_there_is_room(app, project, monkeypatch):
     from gazeloc_core import project as project_module

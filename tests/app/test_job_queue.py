@@ -1,6 +1,7 @@
 """Jobs that wait: in order, each can be taken off; and what was under way is offered after a start, never begun."""
 
 import json
+from pathlib import Path
 
 import pytest
 from app_project import make_app_project
@@ -28,7 +29,9 @@ from gazeloc_core.methods import Method
 WALK = (("recording", "walk"),)
 ALIGN = StartJob("Align", tasks.align, WALK)
 RUN = StartJob("Run tags", tasks.run_all, (*WALK, ("method", Method.TAGS)))
-EXPORT = StartJob("Export", tasks.export, (*WALK, ("formats", ("csv", "tum")), ("output", "out")))
+ROOT = Path("/srv/exports")
+"""Where exports go; nothing is written there in these tests."""
+EXPORT = StartJob("Export", tasks.export, (*WALK, ("formats", ("csv", "tum")), ("output", str(ROOT / "out"))))
 
 
 def apply(state, *actions):
@@ -87,7 +90,7 @@ def told():
 @pytest.fixture
 def kept(project, told):
     (project.folder / "jobs.json").unlink(missing_ok=True)
-    return JobList(project, told.append)
+    return JobList(project, ROOT, told.append)
 
 
 def test_what_was_under_way_is_offered_as_it_was_asked_for_and_not_begun(kept):
@@ -158,9 +161,61 @@ def test_a_damaged_list_is_said_and_offers_nothing(kept, project, told, text):
     assert "jobs.json" in told[0]
 
 
+@pytest.mark.parametrize(
+    ("task", "keywords", "named"),
+    [
+        ("export", {"formats": ["csv"], "output": "/etc"}, "/etc"),
+        ("export", {"formats": ["csv"], "output": "out"}, "out"),
+        ("export", {"formats": ["csv"], "output": "/srv/exports/../../etc/cron.d"}, ".."),
+        ("export", {"formats": ["csv"], "output": "/srv/exports/~root"}, "~root"),
+        ("export", {"formats": ["csv"], "output": "/srv/exports/a\nb"}, "a"),
+        ("export", {"formats": ["csv"], "output": "/srv/exports-too/x"}, "exports-too"),
+        ("export", {"formats": ["csv"], "output": ["/srv/exports"]}, "output"),
+        ("export", {"formats": ["csv"], "output": None}, "output"),
+        ("export", {"formats": ["exe"], "output": "/srv/exports"}, "exe"),
+        ("export", {"formats": [], "output": "/srv/exports"}, "formats"),
+        ("export", {"formats": "csv", "output": "/srv/exports"}, "formats"),
+        ("export", {"formats": [["csv"]], "output": "/srv/exports"}, "formats"),
+        ("export", {"formats": ["csv"]}, "output"),
+        ("refine", {"start": "../../../secrets"}, "secrets"),
+        ("refine", {"start": 7}, "start"),
+        ("refine", {"start": ""}, "alignment"),
+        ("run_all", {"method": ["sfm"]}, "sfm"),
+        ("run_all", {"method": 3}, "3"),
+    ],
+)
+def test_every_value_of_a_job_is_checked_on_the_way_back(kept, project, told, task, keywords, named):
+    entry = {"name": "x", "task": task, "keywords": {"recording": "walk", **keywords}}
+    (project.folder / "jobs.json").write_text(json.dumps({"version": job_list.VERSION, "jobs": [entry]}))
+    assert kept.read() == ()
+    assert len(told) == 1
+    assert "jobs.json" in told[0]
+    assert named in told[0]
+
+
+@pytest.mark.parametrize("recording", [3, None, ["walk"], {"walk": 1}])
+def test_a_recording_that_is_no_text_is_no_recording(kept, project, recording):
+    entry = {"name": "x", "task": "align", "keywords": {"recording": recording}}
+    (project.folder / "jobs.json").write_text(json.dumps({"version": job_list.VERSION, "jobs": [entry]}))
+    assert kept.read() == ()
+
+
+def test_an_export_does_not_go_on_through_a_link_that_leads_out(tmp_path, project, told):
+    root = tmp_path / "export"
+    root.mkdir()
+    (root / "link").symlink_to("/etc")
+    keywords = {"recording": "walk", "formats": ["csv"], "output": str(root / "link")}
+    entry = {"name": "x", "task": "export", "keywords": keywords}
+    (project.folder / "jobs.json").write_text(json.dumps({"version": job_list.VERSION, "jobs": [entry]}))
+    assert JobList(project, root, told.append).read() == ()
+    assert "leads out" in told[0]
+
+
 def test_a_start_after_a_kill_offers_what_ran_and_begins_it_only_when_somebody_says_so(tmp_path, monkeypatch):
     project = make_app_project(tmp_path)
-    JobList(project, print).save(fresh(), apply(fresh(), ALIGN, EXPORT))
+    output = str(project.folder / "export" / "out")
+    export = StartJob("Export", tasks.export, (*WALK, ("formats", ("csv",)), ("output", output)))
+    JobList(project, ROOT, print).save(fresh(), apply(fresh(), ALIGN, export))
     app = App(project, port=0)
     begun = []
     monkeypatch.setattr(app.jobs, "start", lambda name, task, **keywords: begun.append((name, keywords)))
@@ -178,4 +233,4 @@ def test_a_start_after_a_kill_offers_what_ran_and_begins_it_only_when_somebody_s
     again = App(project, port=0)
     step(again, DismissJobs())
     stop(again)
-    assert JobList(project, print).read() == ()
+    assert JobList(project, ROOT, print).read() == ()

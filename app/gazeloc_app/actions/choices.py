@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gazeloc_app.annotation.history import History
-from gazeloc_app.state import AppState, Level
+from gazeloc_app.state import AppState
 from gazeloc_core.methods import Method
 
 
@@ -54,10 +54,10 @@ class OpenRecording:
     history: Callable[[], History]
 
     def apply(self, state: AppState) -> AppState:
-        """The state of the other recording with its own history; refused while a job is about the one that is open."""
-        if state.job is not None:
-            return state.noticed(Level.WARNING, f"“{state.job.name}” is still running; wait for it or cancel it.")
-        return replace(
+        """The state of the other recording with its own history; jobs go on, each is about the recording it names."""
+        if self.recording == state.recording:
+            return state
+        opened = replace(
             self.history().put_into(AppState(state.recordings, self.recording)),
             layers=state.layers,
             compared=state.compared,
@@ -66,8 +66,15 @@ class OpenRecording:
             suggests=state.suggests,
             data_revision=state.data_revision + 1,
             renderer_note=state.renderer_note,
+            job=state.job,
+            waiting_jobs=state.waiting_jobs,
             ended_jobs=state.ended_jobs,
+            suggested=tuple(other for other in state.suggested if other.recording != self.recording),
             offered_jobs=state.offered_jobs,
             jobs_started=state.jobs_started,
             people=state.people,
         )
+        for suggested in state.suggested:
+            if suggested.recording == self.recording:
+                opened = opened.annotate(opened.annotation.with_suggested(suggested))
+        return opened

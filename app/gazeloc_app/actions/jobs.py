@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gazeloc_app.state import AppState, EndedJob, Job, Level, Notice
+from gazeloc_app.state import AppState, EndedJob, Job, Level, Notice, SuggestedAlignment
 
 MAX_WAITING = 20
 MAX_LOG_LINES = 12
@@ -26,7 +26,7 @@ class StartJob:
         number = state.jobs_started + 1
         job = Job(self.name, self.task, self.keywords, number=number)
         if any(job.is_same_work(other) for other in state.jobs):
-            return state.noticed(Level.INFO, f"“{self.name}” is under way already.")
+            return state.noticed(Level.INFO, f"“{state.job_title(job)}” is under way already.")
         if len(state.waiting_jobs) >= MAX_WAITING:
             return state.noticed(Level.WARNING, f"{MAX_WAITING} jobs wait already; let some end first.")
         offered = tuple(other for other in state.offered_jobs if not job.is_same_work(other))
@@ -34,7 +34,8 @@ class StartJob:
         if state.job is None:
             return replace(state, job=job, notice=None)
         state = replace(state, waiting_jobs=(*state.waiting_jobs, job))
-        return state.noticed(Level.INFO, f"“{self.name}” begins after “{state.jobs[-2].name}”.")
+        after = state.job_title(state.jobs[-2])
+        return state.noticed(Level.INFO, f"“{state.job_title(job)}” begins after “{after}”.")
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class CancelJob:
         if dropped is None:
             return state
         state = replace(state, waiting_jobs=tuple(job for job in state.waiting_jobs if job is not dropped))
-        return state.noticed(Level.INFO, f"“{dropped.name}” was taken off the list.")
+        return state.noticed(Level.INFO, f"“{state.job_title(dropped)}” was taken off the list.")
 
 
 @dataclass(frozen=True)
@@ -84,24 +85,30 @@ class JobEnded:
     def apply(self, state: AppState) -> AppState:
         """The state with the next job, the news of this one and its alignment (which can be undone).
 
-        An alignment that a run suggests never replaces one that a person chose.
+        Nothing changes that is shown where the job was about another recording than the one that is open.
         """
-        ended = state.ended_jobs
-        if state.job is not None:
-            ended = (EndedJob(state.job.name, Notice(self.level, self.text), state.job.log, state.job.number), *ended)
-        following = state.waiting_jobs[0] if state.waiting_jobs else None
+        ended, job = state.ended_jobs, state.job
+        recording = state.recording if job is None or job.recording is None else job.recording
+        text = self.text if recording == state.recording else f"{recording}: {self.text}"
+        if job is not None:
+            ended = (EndedJob(job.name, Notice(self.level, self.text), job.log, job.number, job.recording), *ended)
         state = replace(
             state,
-            job=following,
+            job=state.waiting_jobs[0] if state.waiting_jobs else None,
             waiting_jobs=state.waiting_jobs[1:],
             ended_jobs=ended[:_MAX_ENDED],
             data_revision=state.data_revision + 1,
         )
-        is_free = self.by_person or not state.annotation.alignment_by_person
-        if is_free and self.alignment is not None and self.alignment != state.annotation.alignment:
-            chosen = replace(state.annotation, alignment=self.alignment, alignment_by_person=self.by_person)
-            state = state.annotate(chosen)
-        return state.noticed(self.level, self.text)
+        if self.alignment is not None:
+            state = _suggest(state, SuggestedAlignment(recording, self.alignment, self.by_person))
+        return state.noticed(self.level, text)
+
+
+def _suggest(state: AppState, suggested: SuggestedAlignment) -> AppState:
+    if suggested.recording == state.recording:
+        return state.annotate(state.annotation.with_suggested(suggested))
+    others = tuple(other for other in state.suggested if other.recording != suggested.recording)
+    return replace(state, suggested=(*others, suggested))
 
 
 @dataclass(frozen=True)

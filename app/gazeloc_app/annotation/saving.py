@@ -62,7 +62,7 @@ class Saver:
         return bool(self._unsettled) or any(self._wanted[name] is not self._committed[name] for name in self._wanted)
 
     def commit(self, before: AppState, after: AppState) -> None:
-        """Put every step on the disk. Before views render.
+        """Put every step on the disk, also of recordings that are not open. Before views render.
 
         Raises:
             ProjectError: if that fails; the steps are kept, and tried again next time.
@@ -71,6 +71,11 @@ class Saver:
         history = History.of(after)
         if not history.is_same(self._wanted[after.recording]):
             self._wanted[after.recording] = history
+        for suggested in after.suggested:
+            elsewhere = self.open(suggested.recording)
+            annotation = elsewhere.present.with_suggested(suggested)
+            if annotation is not elsewhere.present:
+                self._wanted[suggested.recording] = elsewhere.then(annotation)
         for name, wanted in self._wanted.items():
             if wanted is not self._committed[name]:
                 try:

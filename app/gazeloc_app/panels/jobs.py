@@ -35,14 +35,14 @@ class JobBar:
     def render(self, state: AppState) -> None:
         """Show the jobs and the notice of the state."""
         self._render_notice(state)
-        self._render_offer(state.offered_jobs)
+        self._render_offer(state)
         job = state.job
         self._running = job.number if job is not None else None
         for handle in (self._bar, self._text, self._cancel):
             widgets.set_property(handle, "visible", job is not None)
         if job is not None:
             widgets.set_value(self._bar, round(100 * job.fraction, 1))
-            widgets.set_content(self._text, widgets.box(_progress_html(job)))
+            widgets.set_content(self._text, widgets.box(_progress_html(job, state.job_title(job))))
             widgets.set_property(self._cancel, "disabled", job.is_cancelling)
         widgets.set_property(self._waiting, "visible", bool(state.waiting_jobs))
         widgets.set_content(self._waiting, widgets.box("".join(_waiting_html(job) for job in state.waiting_jobs)))
@@ -54,12 +54,13 @@ class JobBar:
             widgets.set_content(self._notice, widgets.box(widgets.colored(notice.text, color)))
         widgets.set_property(self._notice, "visible", notice is not None)
 
-    def _render_offer(self, jobs: tuple[Job, ...]) -> None:
+    def _render_offer(self, state: AppState) -> None:
+        jobs = state.offered_jobs
         if jobs:
-            names = ", ".join(f"“{job.name}”" for job in jobs)
+            names = ", ".join(f"“{state.job_title(job)}”" for job in jobs)
             sentence = f"GazeLoc was ended while it worked on {names}."
             widgets.set_content(self._offer, widgets.box(widgets.text(sentence)))
-            name = jobs[0].name if len(jobs) == 1 else f"{len(jobs)} jobs"
+            name = state.job_title(jobs[0]) if len(jobs) == 1 else f"{len(jobs)} jobs"
             widgets.set_property(self._resume, "label", f"Go on with {name}")
         for handle in (self._offer, self._resume, self._dismiss):
             widgets.set_property(handle, "visible", bool(jobs))
@@ -74,27 +75,32 @@ class JobLogs:
 
     def __init__(self, gui: GuiApi, folder: str):
         with gui.add_folder("What the jobs said", expand_by_default=False):
-            self._logs = gui.add_html("")
+            self._running = gui.add_html("", visible=False)
+            self._ended = gui.add_html("")
         self._folder = folder
         self._seen: object = None
 
     def render(self, state: AppState) -> None:
         """Show the logs of the state."""
-        seen = (state.ended_jobs, state.job and (state.job.number, state.job.log))
-        if seen == self._seen:
+        widgets.set_property(self._running, "visible", state.job is not None)
+        if state.job is not None:
+            log = _log_html(state.job_title(state.job), "", state.job.log, is_open=True)
+            widgets.set_content(self._running, widgets.box(log))
+        seen = (state.recording, state.ended_jobs, state.job is None)
+        if seen == self._seen:  # what a person has unfolded stays so while a job reports
             return
         self._seen = seen
-        parts = [] if state.job is None else [_log_html(state.job.name, "", state.job.log, is_open=True)]
-        parts += [_ended_html(job) for job in state.ended_jobs]
-        parts = parts or ["Nothing has run since GazeLoc was started."]
+        parts = [_ended_html(job, state.job_title(job)) for job in state.ended_jobs]
+        if not parts and state.job is None:
+            parts = ["Nothing has run since GazeLoc was started."]
         parts.append(f"<div>{widgets.colored(f'Every line is kept in {self._folder}', widgets.MUTED)}</div>")
-        widgets.set_content(self._logs, widgets.box("".join(parts)))
+        widgets.set_content(self._ended, widgets.box("".join(parts)))
 
 
-def _progress_html(job: Job) -> str:
+def _progress_html(job: Job, title: str) -> str:
     if job.is_cancelling:
-        return widgets.text(f"{job.name} · cancelling …")
-    text = " · ".join(part for part in (job.name, job.text) if part)
+        return widgets.text(f"{title} · cancelling …")
+    text = " · ".join(part for part in (title, job.text) if part)
     left = f" · <b>{widgets.text(job.remaining)}</b>" if job.remaining else ""
     return widgets.text(text) + left
 
@@ -107,9 +113,9 @@ def _waiting_html(job: Job) -> str:
     return f'<div style="display:flex;gap:6px;align-items:center">{button} waits: {widgets.text(job.name)}</div>'
 
 
-def _ended_html(job: EndedJob) -> str:
+def _ended_html(job: EndedJob, title: str) -> str:
     color = widgets.LEVEL_COLORS[job.notice.level.value]
-    return _log_html(job.name, widgets.colored(job.notice.text, color), job.log)
+    return _log_html(title, widgets.colored(job.notice.text, color), job.log)
 
 
 def _log_html(name: str, outcome: str, lines: tuple[str, ...], *, is_open: bool = False) -> str:

@@ -56,7 +56,7 @@ class ProblemPanel:
     def render(self, state: AppState) -> None:
         """Show the state's frames."""
         self._state = state
-        widgets.set_property(self._score, "disabled", state.job is not None)
+        widgets.set_property(self._score, "disabled", state.has_job("Score the frames"))
         key = self._data.poses_key(state.recording, state.annotation)
         seen = (state.recording, key, state.data_revision, state.annotation.marks)
         if seen != self._seen:

@@ -53,21 +53,28 @@ class ProjectPanel:
         self._state = state
         widgets.set_value(self._recording, state.recording)
         widgets.set_property(self._run, "disabled", state.has_job("Run everything"))
-        seen = (state.recording, state.annotation.method, state.data_revision)
+        method, running = state.annotation.method, _running_stage(state)
+        stamps = pipeline.stamps(self._project, state.recording, method)  # a job gets on from stage to stage
+        seen = (state.recording, method, state.data_revision, running, stamps)
         if seen != self._seen:
             self._seen = seen
-            rows = [
-                [
-                    widgets.text(status.title),
-                    widgets.colored(status.state.value, _COLORS[status.state]),
-                    widgets.colored(status.reason[:160], widgets.MUTED),
-                ]
-                for status in pipeline.statuses(self._project, state.recording, state.annotation.method)
-            ]
-            widgets.set_content(
-                self._stages, widgets.box(widgets.html_table([f"Method {state.annotation.method}", "", ""], rows))
-            )
+            statuses = pipeline.statuses(self._project, state.recording, method)
+            rows = [_row(status, is_running=status.title == running) for status in statuses]
+            widgets.set_content(self._stages, widgets.box(widgets.html_table([f"Method {method}", "", ""], rows)))
 
     def _run_method(self) -> None:
         keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
         self._dispatch(StartJob("Run everything", tasks.run_all, keywords))
+
+
+def _running_stage(state: AppState) -> str | None:
+    """The title of the stage that a job works at, None where the job is about another recording."""
+    job = state.job
+    return None if job is None or job.recording not in (None, state.recording) else job.text.partition(":")[0]
+
+
+def _row(status: pipeline.StageStatus, *, is_running: bool) -> list[str]:
+    color, word, reason = _COLORS[status.state], status.state.value, status.reason[:160]
+    if is_running and status.state is not State.FRESH:
+        color, word, reason = widgets.GOOD, "running", ""
+    return [widgets.text(status.title), widgets.colored(word, color), widgets.colored(reason, widgets.MUTED)]
