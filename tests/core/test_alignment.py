@@ -49,7 +49,7 @@ def texts(alignment: Alignment, level: str) -> str:
     st.integers(3, 30),
     st.integers(0, 10_000),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_umeyama_recovers_any_similarity(scale, rotvec, translation, count, seed):
     rng = np.random.default_rng(seed)
     truth = Similarity(scale, Rotation.from_rotvec(rotvec), np.array(translation))

@@ -31,7 +31,7 @@ vectors = st.lists(st.floats(-3, 3), min_size=3, max_size=3)
 
 
 @given(vectors, vectors, vectors, vectors)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_errors_are_those_of_the_paper(first_turn, second_turn, first_place, second_place):
     """Section VI-B: arccos((trace(R_gt^T R_es) - 1) / 2), and the distance of the camera centres."""
     truth, found = Rotation.from_rotvec(first_turn), Rotation.from_rotvec(second_turn)
@@ -44,7 +44,7 @@ def test_errors_are_those_of_the_paper(first_turn, second_turn, first_place, sec
 
 
 @given(vectors, vectors)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_errors_do_not_depend_on_the_axes_of_the_scan(turn, place):
     poses, others = camera_poses(5), camera_poses(5, seed=3)
     moved = RigidTransform.from_components(place, Rotation.from_rotvec(turn))

@@ -31,7 +31,7 @@ def recordings(draw: st.DrawFn) -> tuple[np.ndarray, FrameMeasures]:
     return np.cumsum(steps).astype(np.int64), FrameMeasures(sharpness, motion)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(recordings())
 def test_the_laws_hold_at_any_pace(recording: tuple[np.ndarray, FrameMeasures]) -> None:
     times, measures = recording

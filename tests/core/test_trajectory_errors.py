@@ -129,7 +129,7 @@ def test_alignments_find_a_path_that_was_only_moved():
 
 
 @given(st.integers(0, 10_000), st.integers(3, 30))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_each_alignment_errs_no_more_than_the_one_before(seed, count):
     rng = np.random.default_rng(seed)
     found = AbsoluteError.of(*rng.normal(size=(2, count, 3)))
@@ -137,7 +137,7 @@ def test_each_alignment_errs_no_more_than_the_one_before(seed, count):
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_relative_errors_do_not_depend_on_where_either_path_starts(seed):
     rng = np.random.default_rng(seed)
     turn, other = (RigidTransform.from_exp_coords(rng.normal(size=6)) for _ in range(2))
@@ -190,7 +190,7 @@ def test_frames_without_pose_are_no_outliers_but_count_in_percentiles():
 
 
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=40), st.floats(0, 100))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_percentiles_of_finite_errors_are_numpys(errors, percent):
     expected = np.percentile(errors, percent)
     assert percentile(np.array(errors), percent) == pytest.approx(expected, rel=1e-9, abs=1e-9)
