@@ -11,19 +11,19 @@ import viser
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
-from gazeloc_app.actions.picks import MovePoint
 from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.drawing.facing import place_to_stand
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.frames.looking import Looking
+from gazeloc_app.hand import Hand, Reach
 from gazeloc_app.keypoints.picking import ClickFilter
-from gazeloc_app.moving import nudged
 from gazeloc_app.panels.looking import LookingControls
 from gazeloc_app.panels.nudging import add_nudges
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.tools.all import TOOLS, shifted, tools_of
+from gazeloc_app.tools.cloud_point import CloudPointTool
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.keypoints import Point
@@ -55,6 +55,9 @@ class Browser:
         bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut, snaps)
         self._tools = tools_of(bench)
         self._in_hand = self.tool
+        in_cloud = lambda: isinstance(self.tool, CloudPointTool)  # noqa: E731
+        self.hand = Hand(Reach(client, data, self.looking, state, dispatch, bench.front, in_cloud, moves, snaps))
+        add_nudges(client.gui, self.hand.nudge)
         for modifier in (None, SHIFT):
             client.scene.on_click(modifier=modifier)(self._handler(modifier))  # type: ignore[arg-type]
 
@@ -67,6 +70,7 @@ class Browser:
         """Act on a click."""
         if not self._filter.is_new(time.monotonic(), click.direction):
             return  # the second half of a double click
+        self.hand.look_elsewhere()
         tool = shifted(self.tool, self._tools) if is_shifted else self.tool
         try:
             action = tool.click(click)
@@ -88,16 +92,6 @@ class Browser:
         with self._client.atomic():
             self._client.camera.position = eye
             self._client.camera.look_at = np.array(in_scan)
-
-    def _nudge(self, screen: tuple[int, int], step_m: float) -> None:
-        state = self._state()
-        pair = state.annotation.keypoints.get(state.selected_key) if state.selected_key else None
-        if pair is None or pair.scan is None:
-            self._dispatch(Notify(Level.INFO, "Select a keypoint with a place on the scan; arrows move that."))
-            return
-        camera_wxyz = np.asarray(self._client.camera.wxyz)
-        point = nudged(self._data.raycaster(), pair.scan, step_m, screen, camera_wxyz)
-        self._dispatch(MovePoint(pair.key, point))
 
     def take_again(self, tool: str) -> None:
         """Take the tool that this browser had in hand before a reload, where there is one of that name."""
@@ -125,7 +119,6 @@ class Browser:
         )
         self._move = gui.add_checkbox("Move point", False, hint="The click moves the selected pair's point.")
         self._snap = gui.add_checkbox("Snap to tags", True, hint="A click near a tag's centre or corner means that.")
-        add_nudges(gui, self._nudge)
         widgets.on_user(self._choice, lambda _: self._take())
         toggle = gui.add_command("Next tool", hotkey="P", description="What a click does")
         widgets.on_user(toggle, lambda _: self._next_tool(), event="on_trigger")

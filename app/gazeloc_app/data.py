@@ -33,7 +33,7 @@ from gazeloc_core.stages import inputs, registration
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.scores import FrameScores, load_scores
-from gazeloc_core.tag_types import TagCorners
+from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
 
@@ -86,6 +86,12 @@ class ProjectData:
         """Tag corners in the reconstruction."""
         artifact = self.project.artifact(recording, "corners")
         return self._read(f"{recording} tags", artifact, lambda: inputs.load_corners(artifact.read_arrays()))
+
+    def seen_tags(self, recording: str | None) -> TagSightings | None:
+        """The tags that were found in a recording's undistorted frames, or (None) in `scan.frames_with_images`."""
+        artifact = self.project.scan_artifact("tags") if recording is None else self.project.artifact(recording, "tags")
+        load = lambda: inputs.load_sightings(artifact.read_arrays())  # noqa: E731
+        return self._read("seen tags" if recording is None else f"{recording} seen tags", artifact, load)
 
     def recording(self, recording: str) -> Recording:
         """The recording as its files have it."""

@@ -1,18 +1,35 @@
-"""Keypoints dragged along the scan's surface: the marker follows the pointer, and where it is let go counts."""
+"""Keypoints dragged in the scene: the marker follows the pointer, and where it is let go counts.
+
+On the scan's side it slides along the surface. On the reconstruction's it moves in the plane that faces the camera, and
+where it is let go near a point of the cloud it takes that point, as a click there does.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gazeloc_app.actions.action import Action, Notify
-from gazeloc_app.actions.picks import MovePoint
+from gazeloc_app.actions.picks import MovePoint, Side
 from gazeloc_app.data import ProjectData
+from gazeloc_app.keypoints.picking import pick_cloud, tolerance_rad
 from gazeloc_app.moving import dragged
 from gazeloc_app.state import Level
+from gazeloc_core.arrays import Floats
 from gazeloc_core.keypoints import Point
+from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.transforms import Similarity
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """The reconstruction as it is drawn."""
+
+    model: SfmModel
+    scan_from_sfm: Similarity
 
 
 class Dragging:
@@ -20,27 +37,47 @@ class Dragging:
 
     def __init__(self, data: ProjectData, front: Callable[[], int], dispatch: Callable[[Action], None]):
         self._data, self._front, self._dispatch = data, front, dispatch
-        self._from: dict[str, Point] = {}
-        self._at: dict[str, Point] = {}
+        self.cloud: Cloud | None = None
+        """Whose points markers of the reconstruction's side snap to; None while there is none."""
+        self._from: dict[tuple[Side, str], Point] = {}
+        self._at: dict[tuple[Side, str], Point] = {}
 
-    def __call__(self, key: str, event: Any) -> None:
-        """A drag of the marker of a keypoint began, went on or ended."""
-        marker = event.target
+    def __call__(self, side: Side, key: str, event: Any) -> None:
+        """A drag of the marker of a keypoint on one side began, went on or ended."""
+        marker, dragged_one = event.target, (side, key)
         if event.phase == "start":
-            self._from[key] = tuple(np.asarray(marker.position, dtype=np.float64).tolist())
-            self._at.pop(key, None)
+            self._from[dragged_one] = _point(np.asarray(marker.position))
+            self._at.pop(dragged_one, None)
         eye, pointer = np.asarray(event.client.camera.position), np.asarray(event.end_position)
-        point = dragged(self._data.raycaster(), eye, pointer, self._front())
+        if side is Side.SCAN:
+            point = dragged(self._data.raycaster(), eye, pointer, self._front())
+        else:
+            point = _point(pointer) if np.isfinite(pointer).all() else None
         if point is not None and event.phase != "start":
-            self._at[key] = point
+            self._at[dragged_one] = point
             marker.position = np.array(point)
         if event.phase == "end":
-            self._end(key, marker)
+            self._end(side, key, event)
 
-    def _end(self, key: str, marker: Any) -> None:
-        began, at = self._from.pop(key, None), self._at.pop(key, None)
-        if at is not None:
+    def _end(self, side: Side, key: str, event: Any) -> None:
+        began, at = self._from.pop((side, key), None), self._at.pop((side, key), None)
+        if at is not None and side is Side.SCAN:
             self._dispatch(MovePoint(key, at))
+        elif at is not None and self.cloud is not None:
+            self._dispatch(MovePoint(key, _in_reconstruction(self.cloud, at, event.client.camera), Side.SFM))
         elif began is not None:
-            marker.position = np.array(began)
+            event.target.position = np.array(began)
             self._dispatch(Notify(Level.INFO, "There is no scan under the pointer; the keypoint stays where it was."))
+
+
+def _in_reconstruction(cloud: Cloud, at: Point, camera: Any) -> Point:
+    """The point of the cloud under the pointer, else the place itself, in the frame `sfm`."""
+    eye, place = np.asarray(camera.position), np.array(at)
+    tolerance = tolerance_rad(float(camera.fov), max(int(camera.image_height), 1))
+    found = pick_cloud(cloud.scan_from_sfm.apply(cloud.model.points), eye, place - eye, tolerance)
+    return _point(cloud.scan_from_sfm.inverse().apply(place) if found is None else cloud.model.points[found])
+
+
+def _point(values: Floats) -> Point:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
-from gazeloc_app.dragging import Dragging
+from gazeloc_app.dragging import Cloud, Dragging
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.render_worker import Frame
 from gazeloc_app.drawing.scan_screen import ScanScreen
@@ -74,7 +74,8 @@ class SceneView:
         self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
         self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
         self.cameras = SceneCameras(scene, data)
-        self._keypoints = KeypointsLayer(scene, on_drag=Dragging(data, lambda: self.front, dispatch))
+        self._dragging = Dragging(data, lambda: self.front, dispatch)
+        self._keypoints = KeypointsLayer(scene, on_drag=self._dragging)
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
 
@@ -134,6 +135,7 @@ class SceneView:
         )
         if state.layers.is_visible(Layer.TAG_POINTS):
             self._draw_tag_points(state, model)
+        self._dragging.cloud = None if model is None or scan_from_sfm is None else Cloud(model, scan_from_sfm)
         if scan_from_sfm is not None:
             for layer in (self._cloud, self._tag_points):
                 layer.align(scan_from_sfm)

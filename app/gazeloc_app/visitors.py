@@ -59,6 +59,8 @@ class Visitors:
             "hello": self._hello,
             "name": self._name,
             "cancel-job": lambda _, query: self._dispatch(CancelJob(_number(query, "number"))),
+            "frame-click": lambda visit, query: visit.browser.hand.click_in_frame(query),
+            "loupe-click": lambda visit, query: visit.browser.hand.click_in_loupe(query),
             "go-to-step": lambda _, query: self._dispatch(GoToStep(_number(query, "step"), _number(query, "count"))),
         }
 

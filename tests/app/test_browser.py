@@ -52,6 +52,7 @@ def page(scan: RoomScan) -> SimpleNamespace:
     data = MagicMock()
     data.scan.return_value = scan
     data.trajectory.return_value = None
+    data.seen_tags.return_value = None
     render = MagicMock()
     render.submit.side_effect = lambda job, key: page.jobs.append(job) or Future()
 

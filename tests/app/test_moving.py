@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.picks import MovePoint, PickPoint, Side
-from gazeloc_app.dragging import Dragging
+from gazeloc_app.dragging import Cloud, Dragging
 from gazeloc_app.keypoints.snapping import snap
-from gazeloc_app.moving import ARROWS, dragged, nudged
+from gazeloc_app.moving import ARROWS, Nudge, dragged, nudged, nudged_in_view
 from gazeloc_app.state import AppState, Level
 from scipy.spatial.transform import Rotation
 
@@ -40,7 +40,7 @@ def tag(at=(0.0, 0.0, 3.0), size=0.2):
 @pytest.mark.parametrize("key", ARROWS)
 def test_a_nudge_goes_its_length_along_the_surface_in_the_direction_of_the_screen(slope, key):
     start = (0.0, 0.0, 3.0)
-    moved = np.array(nudged(wall(slope), start, 0.01, ARROWS[key], FORWARD))
+    moved = np.array(nudged(wall(slope), start, Nudge(ARROWS[key], 0.01), FORWARD))
     assert np.linalg.norm(moved - start) == pytest.approx(0.01, abs=5e-6)  # Embree counts in single precision
     assert moved[2] == pytest.approx(3.0 + slope * moved[0], abs=5e-6)
     on_screen = moved[:2] / moved[2]
@@ -49,7 +49,7 @@ def test_a_nudge_goes_its_length_along_the_surface_in_the_direction_of_the_scree
 
 def test_a_turned_view_turns_the_arrows():
     rolled = Rotation.from_euler("z", 90, degrees=True).as_quat()[[3, 0, 1, 2]]
-    moved = nudged(wall(), (0.0, 0.0, 3.0), 0.01, (1, 0), rolled)
+    moved = nudged(wall(), (0.0, 0.0, 3.0), Nudge((1, 0), 0.01), rolled)
     np.testing.assert_allclose(moved, (0, 0.01, 3), atol=1e-6)
 
 
@@ -59,7 +59,7 @@ def test_a_drag_ends_on_the_surface_under_the_pointer():
     assert dragged(wall(), EYE, EYE, 0) is None
 
 
-def drag(state, *pointers):
+def drag(state, *pointers, side=Side.SCAN, cloud=None):
     """The state after a drag of k1's marker over these pointers, and where the marker went."""
     box = SimpleNamespace(state=state)
 
@@ -68,11 +68,12 @@ def drag(state, *pointers):
 
     data = SimpleNamespace(raycaster=wall)
     dragging = Dragging(data, lambda: 0, dispatch)
-    marker = SimpleNamespace(position=np.array(state.annotation.keypoints.pairs[0].scan))
-    client = SimpleNamespace(camera=SimpleNamespace(position=EYE))
+    dragging.cloud = cloud
+    marker = SimpleNamespace(position=np.array(side.point_of(state.annotation.keypoints.pairs[0])))
+    client = SimpleNamespace(camera=SimpleNamespace(position=EYE, fov=0.8, image_height=800))
     phases = ["start", *["update"] * (len(pointers) - 2), "end"]
     for phase, pointer in zip(phases, pointers, strict=True):
-        dragging("k1", SimpleNamespace(target=marker, phase=phase, client=client, end_position=pointer))
+        dragging(side, "k1", SimpleNamespace(target=marker, phase=phase, client=client, end_position=pointer))
     return box.state, marker.position
 
 
@@ -86,6 +87,24 @@ def test_a_drag_is_one_step_and_moves_the_marker_on_the_way():
     assert Undo().apply(after).annotation == state.annotation
 
 
+SFM_FROM_SCAN = Similarity(0.5, Rotation.from_euler("y", 40, degrees=True), np.array([1.0, 0, 0]))
+
+
+def test_in_the_reconstruction_a_drag_takes_the_point_of_the_cloud_where_it_ends_and_else_stays_in_the_view():
+    in_scan = np.array([[0.3, 0.3, 4.0], [0.0, 0.0, 2.0]])
+    cloud = Cloud(SimpleNamespace(points=SFM_FROM_SCAN.apply(in_scan)), SFM_FROM_SCAN.inverse())
+    began = PickPoint(Side.SFM, tuple(SFM_FROM_SCAN.apply([0.2, 0.2, 3.0]).tolist())).apply(AppState(("walk",), "walk"))
+    near = np.array([0.3, 0.302, 4.0]) * 3 / 4  # less than a pixel beside the first point
+    after, _ = drag(began, (0.2, 0.2, 3), (0.1, 0.2, 3), near, side=Side.SFM, cloud=cloud)
+    np.testing.assert_allclose(after.annotation.keypoints.pairs[0].sfm, cloud.model.points[0])
+    assert len(after.past) == len(began.past) + 1
+    after, marker = drag(began, (0.2, 0.2, 3), (0.5, -0.4, 3), (0.5, -0.4, 3), side=Side.SFM, cloud=cloud)
+    np.testing.assert_allclose(after.annotation.keypoints.pairs[0].sfm, SFM_FROM_SCAN.apply([0.5, -0.4, 3]))
+    np.testing.assert_allclose(marker, (0.5, -0.4, 3))
+    after, _ = drag(began, (0.2, 0.2, 3), (np.nan, 0, 3), (np.nan, 0, 3), side=Side.SFM, cloud=cloud)
+    assert after.annotation == began.annotation
+
+
 def test_a_drag_off_the_scan_goes_back_and_says_so():
     state = PickPoint(Side.SCAN, (0.0, 0.0, 3.0)).apply(AppState(("walk",), "walk"))
     after, marker = drag(state, (0, 0, -1), (0, 0, -1), (0, 0, -1))
@@ -94,10 +113,17 @@ def test_a_drag_off_the_scan_goes_back_and_says_so():
     np.testing.assert_allclose(marker, (0, 0, 3))
 
 
+def test_in_the_view_a_nudge_goes_its_length_across_it():
+    rolled = Rotation.from_euler("z", 90, degrees=True).as_quat()[[3, 0, 1, 2]]
+    np.testing.assert_allclose(nudged_in_view(np.array([1.0, 2, 3]), Nudge((0, 1), 0.002), rolled), (0.998, 2, 3))
+
+
 def test_moving_a_pair_that_is_gone_or_has_no_place_on_the_scan_changes_nothing():
     state = PickPoint(Side.SFM, (1, 2, 3)).apply(AppState(("walk",), "walk"))
     assert MovePoint("k1", (0, 0, 0)).apply(state) is state
     assert MovePoint("k9", (0, 0, 0)).apply(state) is state
+    (pair,) = MovePoint("k1", (0, 0, 0), Side.SFM).apply(state).annotation.keypoints
+    assert pair.sfm == (0, 0, 0)
 
 
 def test_a_moved_point_no_longer_rests_on_clicks_in_frames():

@@ -60,17 +60,18 @@ class PickPoint:
 
 @dataclass(frozen=True)
 class MovePoint:
-    """A pair's place on the scan was dragged or nudged; clicks in the phone's frames no longer say where it is."""
+    """A pair's place on one side was dragged or nudged; clicks in that side's frames no longer say where it is."""
 
     key: str
     point: Point
+    side: Side = Side.SCAN
 
     def apply(self, state: AppState) -> AppState:
         """The state with the place, the pair selected; unchanged where the pair is gone or has no such place."""
         pair = state.annotation.keypoints.get(self.key)
-        if pair is None or pair.scan is None:
+        if pair is None or self.side.point_of(pair) is None:
             return state
-        moved = state.annotation.keypoints.change(self.key, **Side.SCAN.fields(self.point, (), None))
+        moved = state.annotation.keypoints.change(self.key, **self.side.fields(self.point, (), None))
         return replace(state.with_keypoints(moved), selected_key=self.key)
 
 
@@ -87,18 +88,23 @@ class PickSighting:
     point: Point | None = None
     sigma: float | None = None
     side: Side = Side.SFM
+    name: str = ""
+    """What was hit, where that is known (a tag's corner): names a pair that nobody has named yet."""
 
     def apply(self, state: AppState) -> AppState:
-        """The state with the sighting and, where it is known, the pair's point on that side."""
+        """The state with the sighting and, where it is known, the pair's point on that side; the pair is selected."""
         keypoints = state.annotation.keypoints
         pair = keypoints.get(self.key) if self.key else None
         if pair is None:
             key = keypoints.next_key()
             fields = self.side.fields(None, (self.sighting,), None)
-            pair = KeypointPair(key, _first_name(key), **fields)
+            pair = KeypointPair(key, self.name or _first_name(key), **fields)
             return replace(state.with_keypoints(keypoints.add(pair)), selected_key=key)
         sightings = add_sighting(self.side.sightings_of(pair), self.sighting)
-        return state.with_keypoints(keypoints.change(pair.key, **self.side.fields(self.point, sightings, self.sigma)))
+        fields = self.side.fields(self.point, sightings, self.sigma)
+        if self.name and pair.name == _first_name(pair.key):
+            fields["name"] = self.name
+        return replace(state.with_keypoints(keypoints.change(pair.key, **fields)), selected_key=pair.key)
 
 
 def _first_name(key: str) -> str:

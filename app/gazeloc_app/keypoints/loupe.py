@@ -37,18 +37,22 @@ _KEPT_S = 300
 
 def loupe_url(data: ProjectData, state: AppState, in_scan: Point) -> str:
     """The URL of the scan around a place, seen from where a camera that had it in view stood."""
+    at, start = loupe_places(data, state, in_scan)
+    return f"/loupe.jpg?at={quote(at)}&from={quote(start)}&rev={state.data_revision}"
+
+
+def loupe_places(data: ProjectData, state: AppState, in_scan: Point) -> tuple[str, str]:
+    """The place and the eye from which the loupe sees it, as `place_from_text` reads them."""
     eye = place_to_stand(data, state, in_scan)
     at, start = (",".join(f"{float(value):.4f}" for value in point) for point in (in_scan, eye))
-    return f"/loupe.jpg?at={quote(at)}&from={quote(start)}&rev={state.data_revision}"
+    return at, start
 
 
 def add_loupe_route(routes: Routes, data: ProjectData, process: RenderProcess) -> None:
     """Answer `loupe_url`, of several that wait only the newest; and `/loupe/<recording>/<index>.jpg`, every one."""
 
     async def answer(asked: Asked) -> Reply:
-        place, eye = (_place(asked.query.get(name, "")) for name in ("at", "from"))
-        if np.linalg.norm(place - eye) < 0.01:
-            raise InputError("The loupe stands on the place that it shows.")
+        place, eye = (place_from_text(asked.query.get(name, "")) for name in ("at", "from"))
         job = _job(place, eye, up_vector(data.scan().up_axis))
         body = bytes(await asyncio.wrap_future(process.submit(job, key="loupe")))
         return Reply(body=body, content_type="image/jpeg", cache_s=_KEPT_S)
@@ -65,10 +69,22 @@ def add_loupe_route(routes: Routes, data: ProjectData, process: RenderProcess) -
     routes.get("/loupe/{recording}/{index}.jpg", answer_frame)
 
 
-def _job(place: Floats, eye: Floats, up: Floats) -> Render:
-    pose = pose_facing(eye, place, up)
-    focal_px = SIZE_PX * float(np.linalg.norm(place - eye)) / ACROSS_M
+def loupe_view(place: Floats, eye: Floats, up: Floats) -> tuple[Camera, RigidTransform]:
+    """The camera of the loupe and where it stands, `scan_from_camera`.
+
+    Raises:
+        InputError: if it stands on the place that it shows.
+    """
+    away = float(np.linalg.norm(place - eye))
+    if away < 0.01:
+        raise InputError("The loupe stands on the place that it shows.")
+    focal_px = SIZE_PX * away / ACROSS_M
     camera = Camera.pinhole(SIZE_PX, SIZE_PX, focal_px, focal_px, SIZE_PX / 2, SIZE_PX / 2)
+    return camera, pose_facing(eye, place, up)
+
+
+def _job(place: Floats, eye: Floats, up: Floats) -> Render:
+    camera, pose = loupe_view(place, eye, up)
     w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
     cx, cy, cz = (float(value) for value in eye)
     return Render(camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz))
@@ -85,7 +101,12 @@ def pose_facing(eye: Floats, place: Floats, up: Floats) -> RigidTransform:
     return RigidTransform.from_components(eye, Rotation.from_matrix(axes))
 
 
-def _place(text: str) -> Floats:
+def place_from_text(text: str) -> Floats:
+    """The place (3,) that a page names by “x,y,z”.
+
+    Raises:
+        InputError: if it is none.
+    """
     parts = text.split(",") if len(text) <= 120 else []
     try:
         values = [float(part) for part in parts]

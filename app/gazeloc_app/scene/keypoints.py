@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from gazeloc_app.actions.picks import Side
 from gazeloc_app.scene.placing import NodeGroup
 from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Point
@@ -40,14 +41,14 @@ class _Residual:
     color: Rgb
 
 
-OnDrag = Callable[[str, Any], None]
+OnDrag = Callable[[Side, str, Any], None]
 
 
 class KeypointsLayer:
     """Markers at `/keypoints/<key>/scan` and `/sfm`, the name as a label, and a line between a pair's two sides."""
 
     def __init__(self, scene: viser.SceneApi, radius_m: float = 0.025, on_drag: OnDrag | None = None):
-        """`on_drag(key, event)` hears of drags of the markers on the scan's side, in order."""
+        """`on_drag(side, key, event)` hears of drags of the markers, in order."""
         self._scene = scene
         self._on_drag = on_drag
         self._radius_m = radius_m
@@ -93,14 +94,15 @@ class KeypointsLayer:
             cast_shadow=False,
             receive_shadow=False,
         )
-        if self._on_drag is not None and name.endswith("/scan"):
-            self._hear_drags(handle, name.split("/")[2], self._on_drag)
+        if self._on_drag is not None:
+            _, _, key, side = name.split("/")
+            self._hear_drags(handle, Side(side), key, self._on_drag)
         return handle
 
     @staticmethod
-    def _hear_drags(handle: viser.IcosphereHandle, key: str, on_drag: OnDrag) -> None:
+    def _hear_drags(handle: viser.IcosphereHandle, side: Side, key: str, on_drag: OnDrag) -> None:
         async def dragged(event: Any) -> None:
-            on_drag(key, event)
+            on_drag(side, key, event)
 
         handler: Any = dragged  # viser takes coroutines too, which its annotation does not say
         handle.on_drag("left")(handler)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from gazeloc_app.actions.action import Action, Notify
-from gazeloc_app.actions.picks import PickSighting
-from gazeloc_app.frames.sightings import triangulated
+from gazeloc_app.frames.frame_clicks import clicked_in_frame
 from gazeloc_app.keypoints import picking
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_app.state import Level
 from gazeloc_app.tools.tool import Click, Tool
-from gazeloc_core.keypoints import Sighting, add_sighting
 
 
 class FramePointTool(Tool):
@@ -19,7 +17,7 @@ class FramePointTool(Tool):
     hint = "Look through a camera first. Clicks in two frames make a place in space, in more frames a better one."
 
     def click(self, click: Click) -> Action:
-        """The pixel under the click, and what all of the selected pair's clicks on that side triangulate to."""
+        """The pixel under the click, a tag's corner near it, and what the pair's clicks on that side triangulate to."""
         bench, state = self.bench, self.bench.state()
         target = bench.looking.target
         if target is None:
@@ -34,16 +32,10 @@ class FramePointTool(Tool):
         pixel = picking.pixel_in_frame(camera, pose, click.origin, click.direction, PLANE_M)
         if pixel is None:
             return Notify(Level.INFO, "The click is beside the frame.")
-        side, sighting = target.side, Sighting(target.frame, float(pixel[0]), float(pixel[1]))
-        selected = state.annotation.keypoints.get(state.selected_key) if state.selected_key else None
-        is_free = selected is not None and (side.point_of(selected) is None or side.sightings_of(selected))
-        if selected is None or not (is_free or bench.moves()):
-            return PickSighting(sighting, side=side)
-        sightings = add_sighting(side.sightings_of(selected), sighting)
-        if len(sightings) < 2:
-            return PickSighting(sighting, selected.key, side=side)
-        found = triangulated(bench.data, state.recording, sightings, side)
-        if isinstance(found, str):
-            bench.dispatch(Notify(Level.WARNING, found))
-            return PickSighting(sighting, selected.key, side=side)
-        return PickSighting(sighting, selected.key, *found, side=side)
+        reach_px = bench.reach_px(camera) if bench.snaps() else 0.0
+        *notices, pick = clicked_in_frame(
+            bench.data, state, target.side, target.frame, pixel, moves=bench.moves(), reach_px=reach_px
+        )
+        for notice in notices:
+            bench.dispatch(notice)
+        return pick

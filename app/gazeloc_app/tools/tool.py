@@ -23,6 +23,7 @@ from gazeloc_app.keypoints import picking
 from gazeloc_app.keypoints.snapping import NEAR_PX, Snapped, snap
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats, frozen
+from gazeloc_core.camera import Camera
 from gazeloc_core.keypoints import Point
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
@@ -68,6 +69,10 @@ class Bench:
         """The angle within which a click in this browser's view means a thing."""
         height = max(int(self.client.camera.image_height), 1)
         return picking.tolerance_rad(float(self.client.camera.fov), height)
+
+    def reach_px(self, camera: Camera) -> float:
+        """How far beside a tag's corner a click may be, in pixels of the picture of the camera looked through."""
+        return float(np.mean(camera.focal_px) * np.tan(self.tolerance_rad()) * NEAR_PX / picking.CLICK_RADIUS_PX)
 
     def snapped(
         self, click: Click, tags: TagCorners | None, scan_from_tags: Similarity, hit_in_scan: Floats | None
