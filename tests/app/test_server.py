@@ -5,12 +5,14 @@ import gzip
 import http.client
 import inspect
 import socket
+import time
 
 import pytest
 import viser
 import websockets.asyncio.client
 import websockets.asyncio.server
 import websockets.exceptions
+import websockets.protocol
 from gazeloc_app.door.limits import MAX_MESSAGE_BYTES
 from gazeloc_app.routes import Reply, Routes
 from gazeloc_app.server import make_server
@@ -81,6 +83,17 @@ def test_a_slow_route_does_not_hold_up_the_others(server):
         return await slow
 
     assert asyncio.run(both())[2] == b"slow"
+
+
+@pytest.mark.parametrize("leave", [socket.socket.close, lambda visitor: visitor.shutdown(socket.SHUT_WR)])
+def test_who_leaves_before_the_answer_leaves_no_traceback_in_the_log(server, caplog, leave):
+    with socket.create_connection(("127.0.0.1", server.get_port())) as visitor:
+        visitor.sendall(f"GET /slow HTTP/1.1\r\nHost: localhost:{server.get_port()}\r\n\r\n".encode())
+        time.sleep(0.3)
+        leave(visitor)
+        time.sleep(1.2)
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+    assert get(server)[0] == 200
 
 
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1:9000", "[::1]:8080", "LOCALHOST:1"])
@@ -213,6 +226,8 @@ def test_websockets_still_has_the_names_that_the_door_stands_on():
     for name in ("connection_made", "connection_lost", "process_event", "recv"):
         assert callable(getattr(plain, name))
     assert "self.request = event" in inspect.getsource(plain.process_event)
+    assert "self.protocol.send_response(self.response)" in inspect.getsource(plain.handshake)
+    assert "self.eof_sent = True" in inspect.getsource(websockets.protocol.Protocol)
 
 
 def test_no_light_tints_the_scan(server):

@@ -9,6 +9,7 @@ from typing import Any
 
 from websockets.asyncio.server import ServerConnection
 from websockets.frames import CloseCode
+from websockets.http11 import Response
 
 from gazeloc_app.door import limits
 from gazeloc_app.door.messages import FileTransferPart, FileTransferStartUpload, Refused, read_message
@@ -85,11 +86,22 @@ class VisitorConnection(ServerConnection):
 
     def __init__(self, crowd: Crowd, *parts: Any, **options: Any):
         super().__init__(*parts, **options)
+        self._answer_only_who_waits()
         self.uploads = PageUploads(crowd.underway)
         self._crowd = crowd
         self._pace = limits.Pace()
         self._refused = 0
         self._sent_away: asyncio.Task[None] | None = None
+
+    def _answer_only_who_waits(self) -> None:
+        """A page that is left while a picture is drawn for it closes its connection, which `websockets` asserts not."""
+        protocol, answer = self.protocol, self.protocol.send_response
+
+        def send_response(response: Response) -> None:
+            if not protocol.eof_sent:
+                answer(response)
+
+        protocol.send_response = send_response  # type: ignore[method-assign]
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Part of asyncio's protocol."""
