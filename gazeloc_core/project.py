@@ -82,6 +82,8 @@ class Settings:
     chosen: dict[str, Chosen] = field(default_factory=dict)
     methods: dict[str, Method] = field(default_factory=dict)
     """The method whose poses a recording is shown and exported with, where a person chose one."""
+    track_frames: bool = True
+    """Whether the method `sfm` registers the frames between keyframes too; without, they are interpolated."""
 
 
 @dataclass(frozen=True)
@@ -206,6 +208,11 @@ class Project:
             settings = self.settings
             self.save(replace(settings, methods={**settings.methods, recording: method}))
 
+    def choose_tracking(self, track_frames: bool) -> None:
+        """Register the frames between keyframes too from now on, or not."""
+        with self._changing_settings():
+            self.save(replace(self.settings, track_frames=track_frames))
+
     def scan_artifact(self, stage: str) -> Artifact:
         """The place of a stage's result about the scan."""
         return Artifact(self.folder / "scan" / stage)
@@ -301,6 +308,7 @@ class Project:
                 for name, chosen in settings.chosen.items()
             },
             "methods": {name: method.value for name, method in settings.methods.items()},
+            "track_frames": settings.track_frames,
         }
 
     def _settings_from_json(self, value: dict[str, Any]) -> Settings:
@@ -324,6 +332,7 @@ class Project:
                 for name, chosen in value["chosen"].items()
             },
             methods={name: Method(method) for name, method in value.get("methods", {}).items()},
+            track_frames=bool(value.get("track_frames", True)),
         )
 
     def _required(self, text: str) -> Path:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bytes, Floats, Ints, frozen
 from gazeloc_core.camera import Camera
-from gazeloc_core.transforms import Similarity
+from gazeloc_core.transforms import Similarity, rigid_from_wxyz
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +60,39 @@ class SfmModel:
 
 
 @dataclass(frozen=True, eq=False)
+class TrackedFrames:
+    """T frames that are no images of a reconstruction, each with a pose from its points carried there (localize/track).
+
+    `frame_indices` (T,) rising; `centers` (T, 3) and `wxyz` (T, 4) of `sfm_from_camera`; `points` (T,) how many points
+    agree with the pose, `error_px` (T,) the median distance of these from where the pose puts them, as the lens sees.
+    """
+
+    frame_indices: Ints
+    centers: Floats
+    wxyz: Floats
+    points: Ints
+    error_px: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("frame_indices", "points"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.int64))
+        for name in ("centers", "wxyz", "error_px"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __len__(self) -> int:
+        return len(self.frame_indices)
+
+    @property
+    def sfm_from_camera(self) -> RigidTransform:
+        """The T poses."""
+        return rigid_from_wxyz(self.wxyz, self.centers, "a pose of a tracked frame")
+
+
+@dataclass(frozen=True, eq=False)
 class PlacedModel:
     """A reconstruction, or a piece of one, joined to the recording's frames, and where it lies in the scan."""
 
     model: SfmModel
     scan_from_sfm: Similarity
+    tracked: TrackedFrames | None = None
+    """The frames between its images, where they were tracked."""

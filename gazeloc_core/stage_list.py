@@ -2,7 +2,7 @@
 
 scan       colors ─ tags ─ corners ───────────────────────────┐
 recording  keyframes ─ undistorted ┬ tags ─────────┬ corners ─┴ alignment ─ refinement ─ trajectory ─ gaze
-                                   └ reconstruction ┴ anchoring    (of each method)
+                                   └ reconstruction ┴ anchoring ─ tracking ─┘ (of each method)
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from gazeloc_core.stages import (
     scan,
     scores,
     tags,
+    tracking,
 )
 
 Run = Callable[[Project, str, Report], object]
@@ -168,6 +169,15 @@ _SHARED: tuple[Stage, ...] = (
         methods=SFM,
         run=lambda project, name, report: pieces.align_pieces(project, name, report=report),
         inputs=pieces.piece_inputs,
+    ),
+    Stage(
+        name="tracking",
+        title="Track the frames between keyframes",
+        methods=SFM,
+        weight=15,
+        run=lambda project, name, report: tracking.track_between(project, name, report=report),
+        inputs=tracking.tracking_inputs,
+        is_needed=lambda project: project.settings.track_frames,
     ),
 )
 

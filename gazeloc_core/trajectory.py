@@ -22,6 +22,7 @@ class PoseStatus(StrEnum):
     """How a frame came by its pose; the last two have none."""
 
     REGISTERED = "registered"
+    TRACKED = "tracked"
     INTERPOLATED = "interpolated"
     TAG_ONLY = "tag_only"
     REJECTED = "rejected"
@@ -31,6 +32,9 @@ class PoseStatus(StrEnum):
     def has_pose(self) -> bool:
         """Whether a frame of this status has a pose."""
         return self not in (PoseStatus.REJECTED, PoseStatus.NONE)
+
+
+_MEASURED = (PoseStatus.REGISTERED, PoseStatus.TRACKED, PoseStatus.TAG_ONLY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +96,13 @@ class Trajectory:
 
     @property
     def is_registered(self) -> Bools:
-        """(N,) whether each frame was registered itself, not interpolated."""
+        """(N,) whether each frame is an image of the reconstruction, neither tracked from one nor interpolated."""
         return np.asarray(self.status == PoseStatus.REGISTERED.value)
 
     @property
     def is_localised(self) -> Bools:
-        """(N,) whether each frame was localised by what it shows itself: registered, or by its tags."""
-        return np.isin(self.status, [PoseStatus.REGISTERED.value, PoseStatus.TAG_ONLY.value])
+        """(N,) whether each frame was localised by what it shows itself: registered, tracked, or by its tags."""
+        return np.isin(self.status, [status.value for status in _MEASURED])
 
     @property
     def localised_keyframes(self) -> Ints:
@@ -112,6 +116,7 @@ class Trajectory:
             "frames": len(self),
             "keyframes": int(self.is_keyframe.sum()),
             "localised": int(self.is_localised.sum()),
+            "tracked": int((self.status == PoseStatus.TRACKED.value).sum()),
             "with a pose": int(self.has_pose.sum()),
         }
 

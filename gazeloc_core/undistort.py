@@ -166,10 +166,10 @@ class Undistorter:
 
     def pixels_to_distorted(self, pixels: ArrayLike) -> Floats:
         """Pixels (N, 2) of the target in the source; NaN where the lens never saw the ray."""
-        return _project_valid(self.source, self.target.unproject(pixels))
+        return project_valid(self.source, self.target.unproject(pixels))
 
 
-def _project_valid(camera: Camera, rays: Floats) -> Floats:
+def project_valid(camera: Camera, rays: Floats) -> Floats:
     """Pixels (N, 2) of rays (N, 3), NaN beyond the lens model's valid radius."""
     pixels = camera.project(rays)
     if not camera.is_pinhole:
@@ -180,7 +180,7 @@ def _project_valid(camera: Camera, rays: Floats) -> Floats:
 
 def _maps(source: Camera, target: Camera) -> tuple[Bytes, Bytes]:
     """OpenCV's fixed-point maps: for each target pixel its place in the source, first pixel centre at (0, 0)."""
-    pixels = _project_valid(source, target.unproject(target.pixel_centres()))
+    pixels = project_valid(source, target.unproject(target.pixel_centres()))
     places = np.where(np.isfinite(pixels), pixels - HALF_PIXEL, _OUTSIDE)
     places = np.clip(places, _OUTSIDE, max(source.width, source.height) + 10)
     maps = places.astype(np.float32).reshape(target.height, target.width, 2)

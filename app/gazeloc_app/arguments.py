@@ -8,7 +8,7 @@ import functools
 import re
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -36,6 +36,14 @@ OptionalPath = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 OptionalText = Annotated[str | None, tyro.conf.arg(metavar="TEXT")]
 OptionalName = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
 TagSize = Annotated[float | None, tyro.conf.arg(metavar="METRES", help=TAG_SIZE_HELP)]
+Between = Annotated[
+    Literal["track", "interpolate"] | None,
+    tyro.conf.arg(
+        help="What the method sfm does with the frames between keyframes: track (registers each, as from the start) or "
+        "interpolate (quicker, not measured). The project keeps it.",
+        help_behavior_hint="",
+    ),
+]
 AllowedHosts = Annotated[
     tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME", help_behavior_hint="")
 ]

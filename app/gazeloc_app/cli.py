@@ -21,6 +21,7 @@ import tyro
 
 from gazeloc_app.arguments import (
     AllowedHosts,
+    Between,
     Command,
     Flag,
     OptionalName,
@@ -106,17 +107,16 @@ def add(
 
 
 @deferred
-def run(project: Project, *, method: str = "sfm", recording: OptionalName = None) -> None:
+def run(project: Project, *, method: str = "sfm", recording: OptionalName = None, between: Between = None) -> None:
     """Run every stage that is missing or stale, from the files to gaze in the room.
 
     Args:
-        project: The project folder.
         method: How frames are localised: sfm, sfm-paper, tags, tags-paper or global.
         recording: Only this recording; by default all.
     """
     from gazeloc_app import commands
 
-    commands.run(project, method=method, recording=recording)
+    commands.run(project, method=method, recording=recording, between=between)
 
 
 @deferred

@@ -72,10 +72,12 @@ def add(folder: Path, *, name: str | None, recording: RecordingEntry) -> None:
     print(f"{folder}: the recording {name!r} was added. Next: gazeloc run {folder}")
 
 
-def run(folder: Path, *, method: str, recording: str | None) -> None:
+def run(folder: Path, *, method: str, recording: str | None, between: str | None = None) -> None:
     """Run the stages with a progress bar, and say how long each took and what the alignment is worth."""
     project, how = Project.open(folder), method_named(method)
     with project.lock(), progress_bar() as report:
+        if between is not None:
+            project.choose_tracking(between == "track")
         times = pipeline.run(project, method=how, recording=recording, report=report)
     total = sum(time.seconds for time in times) or 1.0
     rows = [

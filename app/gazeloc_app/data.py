@@ -28,11 +28,12 @@ from gazeloc_core.project import Project
 from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan
-from gazeloc_core.sfm_model import PlacedModel, SfmModel
+from gazeloc_core.sfm_model import PlacedModel, SfmModel, TrackedFrames
 from gazeloc_core.stages import inputs, registration
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.scores import FrameScores, load_scores
+from gazeloc_core.stages.tracking import load_tracked
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
@@ -164,9 +165,9 @@ class ProjectData:
         if alignment is None or model is None or keyframes is None:
             return None
         times = self.recording(recording).timestamp_ns
-        placed = [PlacedModel(model, alignment.scan_from_sfm), *self.pieces(recording)]
+        placed = [PlacedModel(model, alignment.scan_from_sfm, self.tracked(recording)), *self.pieces(recording)]
         load = lambda: localize_sfm(times, keyframes, placed)  # noqa: E731
-        content = (key, model, id(keyframes), _stamp(self.project.artifact(recording, "pieces")))
+        content = (key, model, id(keyframes), _stamp(self.project.artifact(recording, "pieces")), placed[0].tracked)
         return self._remember_or_say(f"{recording} trajectory {self._slot(recording, key)}", content, load)
 
     def _slot(self, recording: str, key: str | None) -> int:
@@ -176,6 +177,12 @@ class ProjectData:
             slot = next((slot for slot, other in kept if other == key), kept[0][0])
             self._slots[recording] = [*(item for item in kept if item[0] != slot), (slot, key)]
             return slot
+
+    def tracked(self, recording: str) -> TrackedFrames | None:
+        """The frames tracked between the reconstruction's images."""
+        artifact = self.project.artifact(recording, "tracking")
+        content = (_stamp(artifact), _stamp(inputs.sfm_models(self.project, recording)))
+        return self._remember_or_say(f"{recording} tracked", content, lambda: load_tracked(self.project, recording))
 
     def pieces(self, recording: str) -> list[PlacedModel]:
         """The smaller pieces of the reconstruction that have a place in the scan."""

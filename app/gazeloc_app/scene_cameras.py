@@ -36,6 +36,7 @@ METHOD_COLORS = {
 """Of methods that are compared with the chosen one, which is always red."""
 STATUS_COLORS: dict[PoseStatus, Rgb] = {
     PoseStatus.REGISTERED: (0, 114, 178),
+    PoseStatus.TRACKED: (86, 180, 233),
     PoseStatus.INTERPOLATED: (230, 159, 0),
     PoseStatus.TAG_ONLY: (204, 121, 167),
 }

@@ -31,8 +31,8 @@ CAMERA_FROM_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def registered_frames(trajectory: Trajectory) -> list[int]:
-    """The frames whose pose was measured, not interpolated: those that training should see."""
-    wanted = trajectory.has_pose & (trajectory.status != PoseStatus.INTERPOLATED.value)
+    """The frames that training should see: measured ones, not those tracked between keyframes, which are sharper."""
+    wanted = trajectory.is_localised & (trajectory.status != PoseStatus.TRACKED.value)
     return [int(index) for index in np.flatnonzero(wanted)]
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bools, Ints
@@ -35,8 +37,9 @@ def localize_sfm(
     its pose from the first.
 
     - `registered`: a piece has an image of this frame (a keyframe or not).
-    - `interpolated`: none has, but the nearest registered frames before and after are of one piece and at most
-      `max_gap_s` apart.
+    - `tracked`: none has, but a piece's points were carried there and its pose was measured from them.
+    - `interpolated`: neither, but the nearest such frames before and after are of one piece and at most `max_gap_s`
+      apart.
     - `none`: all others. A keyframe that the reconstruction was given and could not register is among them: it was
       tried and failed, which speaks against the motion around it being simple, so it is never filled in.
 
@@ -47,10 +50,10 @@ def localize_sfm(
     times = np.asarray(timestamp_ns, dtype=np.int64)
     is_keyframe = frame_mask(np.asarray(keyframes, dtype=np.int64), len(times), "keyframes")
     status = np.full(len(times), PoseStatus.NONE.value, dtype="U16")
-    frames, owner, poses = _registered(placed, len(times))
+    frames, owner, poses, found_as = _measured(placed, len(times))
     if poses is None:
         return Trajectory.from_poses(times, status, is_keyframe, frames, None)
-    status[frames] = PoseStatus.REGISTERED.value
+    status[frames] = found_as
     is_open = (status == PoseStatus.NONE.value) & ~is_keyframe & within_gaps(times, times[frames], options.max_gap_s)
     between = np.flatnonzero(is_open)
     after = np.searchsorted(frames, between)
@@ -63,25 +66,41 @@ def localize_sfm(
     )
 
 
-def _registered(placed: Sequence[PlacedModel], count: int) -> tuple[Ints, Ints, RigidTransform | None]:
-    """The registered frames, rising, the piece that each is taken from, and their poses (None for no frame)."""
+def _measured(placed: Sequence[PlacedModel], count: int) -> tuple[Ints, Ints, RigidTransform | None, NDArray[Any]]:
+    """The frames that were measured, rising, the piece that each is taken from, their poses (None for no frame) and
+    statuses. An image goes before a tracked frame, a larger piece's before a smaller one's."""
     owner = np.full(count, -1, dtype=np.int64)
+    status = np.full(count, PoseStatus.NONE.value, dtype="U16")
     frames: list[Ints] = []
     poses: list[RigidTransform] = []
+    for found_as, number, known, sfm_from_camera in _found(placed, count):
+        is_new = owner[known] < 0
+        if is_new.any():
+            new = known[is_new]
+            frames.append(new)
+            owner[new], status[new] = number, found_as.value
+            poses.append(placed[number].scan_from_sfm.compose_pose(sfm_from_camera[is_new]))
+    if not frames:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), None, np.empty(0, dtype="U16")
+    joined = np.concatenate(frames)
+    order = np.argsort(joined)
+    rising = joined[order]
+    return rising, owner[rising], RigidTransform.concatenate(poses)[order], status[rising]
+
+
+def _found(placed: Sequence[PlacedModel], count: int) -> Iterator[tuple[PoseStatus, int, Ints, RigidTransform]]:
+    """How they were found, the piece's number, frames (M,) and their M `sfm_from_camera`: all images, then the rest."""
     for number, piece in enumerate(placed):
         images = np.flatnonzero(piece.model.frame_indices >= 0)
         frame_mask(piece.model.frame_indices[images], count, "images of the reconstruction")
-        images = images[owner[piece.model.frame_indices[images]] < 0]
-        if len(images) == 0:
-            continue
-        frames.append(piece.model.frame_indices[images])
-        owner[frames[-1]] = number
-        poses.append(piece.scan_from_sfm.compose_pose(piece.model.sfm_from_camera[images]))
-    if not frames:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), None
-    joined = np.concatenate(frames)
-    order = np.argsort(joined)
-    return joined[order], owner[joined[order]], RigidTransform.concatenate(poses)[order]
+        if len(images):
+            frames = piece.model.frame_indices[images]
+            yield PoseStatus.REGISTERED, number, frames, piece.model.sfm_from_camera[images]
+    for number, piece in enumerate(placed):
+        tracked = piece.tracked
+        if tracked is not None and len(tracked):
+            frame_mask(tracked.frame_indices, count, "tracked frames")
+            yield PoseStatus.TRACKED, number, tracked.frame_indices, tracked.sfm_from_camera
 
 
 def within_gaps(at_ns: Ints, known_ns: Ints, max_gap_s: float) -> Bools:

@@ -12,6 +12,7 @@ from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.tracking import load_tracked
 
 _FILE = "pieces.json"
 
@@ -77,7 +78,11 @@ def load_pieces(project: Project, recording: str) -> tuple[Piece, ...]:
 def placed_pieces(project: Project, recording: str) -> list[PlacedModel]:
     """The smaller pieces that have a place in the scan, largest first."""
     return [
-        PlacedModel(inputs.load_sfm_model(project, recording, piece.rank), piece.alignment.scan_from_sfm)
+        PlacedModel(
+            inputs.load_sfm_model(project, recording, piece.rank),
+            piece.alignment.scan_from_sfm,
+            load_tracked(project, recording, piece.rank),
+        )
         for piece in load_pieces(project, recording)
         if piece.alignment is not None
     ]

@@ -18,6 +18,7 @@ from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.registration import chosen_alignment
 from gazeloc_core.stages.tags import tags_inputs, tags_paper_inputs
+from gazeloc_core.stages.tracking import load_tracked, tracked_content
 from gazeloc_core.trajectory import Trajectory
 
 
@@ -33,10 +34,12 @@ def sfm_inputs(project: Project, recording: str) -> dict[str, str]:
     """The hashes that the poses of the method `sfm` depend on."""
     chosen = project.settings.chosen.get(recording)
     in_force = chosen_alignment(project, recording).key if chosen is None else chosen.alignment
+    tracked = tracked_content(project, recording)
     return {
         **_model_inputs(project, recording, inputs.sfm_models(project, recording)),
         "pieces": project.artifact(recording, "pieces").header().content,
         "alignment": in_force,
+        **({} if tracked is None else {"tracked frames": tracked}),
     }
 
 
@@ -75,7 +78,8 @@ def placed_models(project: Project, recording: str, method: Method) -> list[Plac
         return [PlacedModel(inputs.load_model(project, recording), scan_from_sfm)]
     in_force = chosen_alignment(project, recording)
     largest = inputs.load_sfm_model(project, recording)
-    return [PlacedModel(largest, in_force.scan_from_sfm), *placed_pieces(project, recording)]
+    tracked = load_tracked(project, recording)
+    return [PlacedModel(largest, in_force.scan_from_sfm, tracked), *placed_pieces(project, recording)]
 
 
 def _place_models(

@@ -129,10 +129,21 @@ def test_status_is_one_json_object_and_changes_nothing(capsys, home: Path):
         ("alignment", "missing"),
         ("refinement", "missing"),
         ("pieces", "missing"),
+        ("tracking", "missing"),
         ("trajectory", "missing"),
         ("gaze", "missing"),
     ]
     assert contents(home) == before
+
+
+def test_what_becomes_of_frames_between_keyframes_is_kept_with_the_project(capsys, home: Path):
+    project = Project.open(home / "project")
+    for between, stages in (("interpolate", 0), ("track", 1)):
+        with pytest.raises(SystemExit):  # the alignment fails for want of keypoints
+            main(["run", str(home / "project"), "--between", between])
+        assert project.settings.track_frames is (between == "track")
+        value = json.loads(answer(capsys, "status", home / "project", "--json"))
+        assert [stage["stage"] for stage in value["stages"]].count("tracking") == stages
 
 
 def test_evaluate_is_one_json_object(capsys, home: Path):

@@ -10,7 +10,16 @@ CORE = sorted((CHECKOUT / "gazeloc_core").rglob("*.py"))
 APP = sorted((CHECKOUT / "app" / "gazeloc_app").rglob("*.py"))
 
 HOMES = {
-    "pycolmap": {"camera", "sfm", "sfm_polish", "colmap_io", "colmap_format", "synthetic_model", "synthesis"},
+    "pycolmap": {
+        "camera",
+        "sfm",
+        "sfm_polish",
+        "colmap_io",
+        "colmap_format",
+        "frame_pose",
+        "synthetic_model",
+        "synthesis",
+    },
     "open3d": {"raycast", "clouds", "surfaces", "display_mesh", "synthesis"},
     "pyrender": {"render"},
     "pyapriltags": {"tags", "tag_bitmaps"},

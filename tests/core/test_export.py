@@ -1,6 +1,7 @@
 """Exports, read back by programs that are not ours, or by geometry."""
 
 import json
+from dataclasses import replace
 from decimal import Decimal
 
 import cv2
@@ -44,6 +45,16 @@ def pixel_error(camera_from_scan_rows, matrix, truth_pose) -> float:
     found = in_export[ahead] @ matrix.T
     assert ahead.any()
     return float(np.abs(expected[:, :2] / expected[:, 2:] - found[:, :2] / found[:, 2:]).max())
+
+
+def test_tracked_frames_are_exported_as_such_but_training_sees_keyframes_alone(tmp_path):
+    trajectory = make_trajectory()
+    tracked = replace(trajectory, status=np.where(trajectory.status == "interpolated", "tracked", trajectory.status))
+    write_poses_csv(tracked, tmp_path / "poses.csv")
+    assert pd.read_csv(tmp_path / "poses.csv")["status"][1] == "tracked"
+    write_tum(tracked, tmp_path / "poses.tum", TumOptions(registered_only=True))
+    assert len(read_tum(tmp_path / "poses.tum")[0]) == len(WITH_POSE)
+    assert registered_frames(tracked) == [0, 4, 5]
 
 
 def test_poses_csv_has_every_frame_and_poses_only_where_there_are(tmp_path):

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm, within_gaps
-from gazeloc_core.sfm_model import PlacedModel
-from gazeloc_core.transforms import Similarity, rotation_angle_rad
+from gazeloc_core.sfm_model import PlacedModel, TrackedFrames
+from gazeloc_core.transforms import Similarity, rotation_angle_rad, wxyz_of
 
 START_NS = 1_700_000_000_123_456_789
 
@@ -121,3 +121,49 @@ def test_nothing_is_interpolated_from_one_piece_to_another():
 
 def test_no_piece_with_a_place_gives_no_pose():
     assert not localize_sfm(times(5), np.array([0, 4]), []).has_pose.any()
+
+
+def tracked_frames(frames, poses):
+    return TrackedFrames(
+        frame_indices=np.array(frames),
+        centers=poses.translation,
+        wxyz=wxyz_of(poses.rotation),
+        points=np.full(len(frames), 99),
+        error_px=np.full(len(frames), 0.4),
+    )
+
+
+def test_tracked_frames_keep_their_own_pose_and_say_so():
+    room, model = model_of([0, 6])
+    elsewhere = model_of([9, 9])[1].sfm_from_camera  # no line between its neighbours leads through these
+    piece = PlacedModel(model, room.scan_from_sfm, tracked_frames([2, 6], elsewhere))
+    trajectory = localize_sfm(times(9), np.array([0, 6]), [piece])
+    expected = ["registered", "interpolated", "tracked", *["interpolated"] * 3, "registered", "none", "none"]
+    assert trajectory.status.tolist() == expected  # frame 6 has an image: that goes first
+    pose = room.scan_from_sfm.compose_pose(elsewhere[0])
+    np.testing.assert_allclose(trajectory.pose(2).as_matrix(), pose.as_matrix(), atol=1e-9)
+    assert trajectory.counts()["tracked"] == 1
+    assert trajectory.is_localised.sum() == 3
+
+
+def test_a_keyframe_that_was_not_registered_may_be_tracked():
+    room, model = model_of([0, 4])
+    piece = PlacedModel(model, room.scan_from_sfm, tracked_frames([2], model.sfm_from_camera[:1]))
+    trajectory = localize_sfm(times(5), np.array([0, 2, 3, 4]), [piece])
+    assert trajectory.status.tolist() == ["registered", "interpolated", "tracked", "none", "registered"]
+
+
+def test_no_tracked_frame_is_as_if_nothing_was_tracked():
+    room, model = model_of([0, 4])
+    nothing = tracked_frames([], model.sfm_from_camera[:0])
+    arguments = (times(5), np.array([0, 4]))
+    with_none = localize_sfm(*arguments, [PlacedModel(model, room.scan_from_sfm, nothing)])
+    without = localize_sfm(*arguments, [PlacedModel(model, room.scan_from_sfm)])
+    np.testing.assert_array_equal(with_none.centers, without.centers)
+
+
+def test_tracked_frames_of_another_recording_are_refused():
+    room, model = model_of([0, 4])
+    piece = PlacedModel(model, room.scan_from_sfm, tracked_frames([7], model.sfm_from_camera[:1]))
+    with pytest.raises(GeometryError, match="tracked frames name frame 7"):
+        localize_sfm(times(5), np.array([0, 4]), [piece])

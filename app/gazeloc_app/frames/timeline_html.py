@@ -19,9 +19,10 @@ from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 PARTS = 400
 """A longer recording is drawn in this many parts, each with its worst frame."""
-_WORST_FIRST = ("rejected", "none", "tag_only", "interpolated", "registered")
+_WORST_FIRST = ("rejected", "none", "tag_only", "interpolated", "tracked", "registered")
 STATUS_COLORS = {  # by Okabe and Ito, told apart by eyes that see red and green alike
     PoseStatus.REGISTERED.value: "#009e73",
+    PoseStatus.TRACKED.value: "#0072b2",
     PoseStatus.INTERPOLATED.value: "#56b4e9",
     PoseStatus.TAG_ONLY.value: "#e69f00",
     PoseStatus.REJECTED.value: "#d55e00",
@@ -29,6 +30,7 @@ STATUS_COLORS = {  # by Okabe and Ito, told apart by eyes that see red and green
 }
 STATUS_NAMES = {
     PoseStatus.REGISTERED.value: "registered",
+    PoseStatus.TRACKED.value: "tracked",
     PoseStatus.INTERPOLATED.value: "interpolated",
     PoseStatus.TAG_ONLY.value: "tag only",
     PoseStatus.REJECTED.value: "rejected",

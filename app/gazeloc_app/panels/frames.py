@@ -27,7 +27,8 @@ from gazeloc_core.trajectory import PoseStatus
 NOTHING = "nothing"
 STATUS_TEXT = {
     PoseStatus.REGISTERED.value: "registered",
-    PoseStatus.INTERPOLATED.value: "interpolated between registered frames",
+    PoseStatus.TRACKED.value: "tracked: measured from points of the keyframes around it",
+    PoseStatus.INTERPOLATED.value: "interpolated between frames around it: not measured",
     PoseStatus.TAG_ONLY.value: "from a tag alone",
     PoseStatus.REJECTED.value: "rejected: no pose",
     PoseStatus.NONE.value: "not localised: no pose",

@@ -24,7 +24,7 @@ class CameraTool(Tool):
         """The camera under the click, drawn or not thinned out."""
         bench, state = self.bench, self.bench.state()
         trajectory = bench.data.trajectory(state.recording, bench.data.poses_key(state.recording, state.annotation))
-        frames = np.zeros(0, np.int64) if trajectory is None else np.flatnonzero(trajectory.is_localised)
+        frames = np.zeros(0, np.int64) if trajectory is None else trajectory.localised_keyframes
         photos = bench.data.scan().frames_with_images if state.layers.is_visible(Layer.PHONE) else ()
         poses = [photo.scan_from_camera for photo in photos]
         if trajectory is not None and len(frames):
