@@ -75,19 +75,33 @@ def read_views(folder: Path) -> tuple[SavedView, ...]:
     try:
         if value["format"] != _FORMAT or value["version"] != _VERSION:
             raise InputError.of(path, f"written as {value['format']} {value['version']}", "update gazeloc")
-        entries = value["views"]
-        return tuple(SavedView.of(str(v["name"]), v["eye"], v["target"], v["fov_rad"]) for v in entries)
+        return views_from_json(value["views"])
     except (KeyError, TypeError, ValueError) as error:
         raise InputError.of(path, f"the saved views are damaged ({error})", "restore or remove it") from error
 
 
 def write_views(folder: Path, views: tuple[SavedView, ...]) -> None:
     """Replace the views of a project folder."""
-    entries = [
+    value = {"format": _FORMAT, "version": _VERSION, "views": views_to_json(views)}
+    write_json_atomically(folder / "views.json", value)
+
+
+def views_to_json(views: tuple[SavedView, ...]) -> list[dict[str, Any]]:
+    """Views as JSON."""
+    return [
         {"name": view.name, "eye": list(view.eye), "target": list(view.target), "fov_rad": view.fov_rad}
         for view in views
     ]
-    write_json_atomically(folder / "views.json", {"format": _FORMAT, "version": _VERSION, "views": entries})
+
+
+def views_from_json(value: Any) -> tuple[SavedView, ...]:
+    """The same again.
+
+    Raises:
+        InputError: if one is no place to look from.
+        KeyError, TypeError, ValueError: if they are garbled.
+    """
+    return tuple(SavedView.of(str(v["name"]), v["eye"], v["target"], v["fov_rad"]) for v in value)
 
 
 def _distance(size_m: Floats, direction: Floats) -> float:

@@ -11,7 +11,6 @@ import signal
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import viser
@@ -20,8 +19,8 @@ from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
 from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
 from gazeloc_app.actions.views import NameRenderer
+from gazeloc_app.annotation.room_saving import RoomSaver
 from gazeloc_app.annotation.saving import Saver
-from gazeloc_app.annotation.view_saving import ViewSaver
 from gazeloc_app.browser import Browser
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
@@ -86,9 +85,9 @@ class App:
             self.data.scan()
             self._saver = Saver(project, self._say_damage)
             self._job_list = JobList(project, self.export_folder, self._say_damage)
-            self._views = ViewSaver(project.folder, self._say_damage)
-            first = replace(self.store.state, views=self._views.read())
-            self.store.begin(self._saver.open(first.recording).put_into(first))
+            self._room = RoomSaver(project.folder, self._say_damage)
+            first = self.store.state
+            self.store.begin(self._saver.open(first.recording).with_room_of(self._room.read()).put_into(first))
             self.data.recording(self.store.state.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)
             self.store.dispatch(OfferJobs(self._job_list.read()))
@@ -117,9 +116,9 @@ class App:
         self._first_pose = FirstPose(self.data, self.store.dispatch)
         self.store.add_view(self._render_browsers)
         self.store.add_view(self._visitors.render)
+        self.store.add_saver(self._room.save)
         self.store.add_saver(self._saver.commit)
         self.store.add_saver(self._job_list.save)
-        self.store.add_saver(self._views.save)
         self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
         self.store.add_effect(self.live.follow)

@@ -65,7 +65,7 @@ class SceneCameras:
         camera = self._data.camera(state.recording)
         camera = camera if camera is not None and camera.is_pinhole else None
         truth, step = self._data.true_keyframes(state.recording), self.thinning(state)
-        color = state.layers.tint(Layer.TRUTH) or (GREEN if state.layers.coloring is Coloring.SET else GREY)
+        color = state.annotation.tint(Layer.TRUTH) or (GREEN if state.layers.coloring is Coloring.SET else GREY)
         self._once("truth", (truth, camera, color, step), lambda: self.truth.show(_thinned(truth, camera, color, step)))
         scale = self.scale(state)
         for method in Method:
@@ -90,7 +90,7 @@ class SceneCameras:
         return ColorScale.of_errors(values) if is_error else ColorScale.of_range(values)
 
     def _draw_phone(self, state: AppState) -> None:
-        scan, tint = self._data.scan(), state.layers.tint(Layer.PHONE)
+        scan, tint = self._data.scan(), state.annotation.tint(Layer.PHONE)
 
         def show() -> None:
             poses = [frame.scan_from_camera for frame in scan.frames]
@@ -109,7 +109,7 @@ class SceneCameras:
         is_chosen = method is state.annotation.method
         layer = self.estimate if is_chosen else self.compared[method]
         trajectory = self._trajectory(state, method) if is_chosen or method in state.compared else None
-        tint = state.layers.tint(Layer.ESTIMATE) if is_chosen else None
+        tint = state.annotation.tint(Layer.ESTIMATE) if is_chosen else None
         color: Rgb = tint or (RED if is_chosen else METHOD_COLORS[method])
         coloring = state.layers.coloring
         values = self._values(state, method) if trajectory is not None else None

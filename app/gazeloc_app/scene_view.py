@@ -119,13 +119,13 @@ class SceneView:
         if display is not None:
             self.front = display.front
             self._glimpse.show(None, None)
-            self._room.set_look(state.layers.tint(Layer.SCAN) or WHITE, two_sided=self.front == 0)
+            self._room.set_look(state.annotation.tint(Layer.SCAN) or WHITE, two_sided=self.front == 0)
             self._room.show(display.glb)
         elif self._room.is_empty:
             self._once("glimpse", mesh, lambda: self._glimpse.show(*glimpse(mesh, GLIMPSE_POINTS)))
 
     def _draw_reconstruction(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
-        model, tint = self._data.model(state.recording), state.layers.tint(Layer.POINTS)
+        model, tint = self._data.model(state.recording), state.annotation.tint(Layer.POINTS)
         self._once(
             "points",
             (model, tint),

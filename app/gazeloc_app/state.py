@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
@@ -123,6 +124,19 @@ class Annotation:
     """Whose poses are shown and exported."""
     marks: FrameMarks = field(default_factory=FrameMarks)
     """What people think of frames' poses."""
+    views: tuple[SavedView, ...] = ()
+    """Places to look at the room from; about the room, so the same in all recordings."""
+    tints: tuple[tuple[Layer, Rgb], ...] = ()
+    """Layers' colours in place of their own; the same in all recordings."""
+
+    def tint(self, layer: Layer) -> Rgb | None:
+        """A layer's tint, None for its own colours."""
+        return dict(self.tints).get(layer)
+
+    def with_tint(self, layer: Layer, tint: Rgb | None) -> Annotation:
+        """With one layer's tint set or taken away."""
+        others = tuple(item for item in self.tints if item[0] is not layer)
+        return replace(self, tints=others if tint is None else (*others, (layer, tint)))
 
     def with_suggested(self, suggested: SuggestedAlignment) -> Annotation:
         """With an alignment that a job suggests; one of a run never replaces one that a person chose."""
@@ -141,12 +155,15 @@ class SuggestedAlignment:
     by_person: bool
 
 
+ABOUT_THE_ROOM = ("views", "tints")
+"""The fields of `Annotation` that are the same in all recordings."""
+
+
 @dataclass(frozen=True)
 class LayerSettings:
-    """Which layers show, and how they are tinted (RGB; None for a layer's own colours)."""
+    """Which layers show, and what colours stand for."""
 
     hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS, Layer.GRID})
-    tints: tuple[tuple[Layer, tuple[int, int, int]], ...] = ()
     coloring: Coloring = Coloring.SET
     thinning: int | None = None
     """Every how many of the recording's cameras one is drawn; None leaves it to their number."""
@@ -155,18 +172,9 @@ class LayerSettings:
         """Whether a layer shows."""
         return layer not in self.hidden
 
-    def tint(self, layer: Layer) -> tuple[int, int, int] | None:
-        """A layer's tint, None for its own colours."""
-        return dict(self.tints).get(layer)
-
     def with_visible(self, layer: Layer, is_visible: bool) -> LayerSettings:
         """With one layer shown or hidden."""
         return replace(self, hidden=self.hidden - {layer} if is_visible else self.hidden | {layer})
-
-    def with_tint(self, layer: Layer, tint: tuple[int, int, int] | None) -> LayerSettings:
-        """With one layer's tint set or taken away."""
-        others = tuple(item for item in self.tints if item[0] is not layer)
-        return replace(self, tints=others if tint is None else (*others, (layer, tint)))
 
 
 MAX_UNDO = 500
@@ -194,8 +202,8 @@ class AppState:
     """Why the last change of the keypoints gave no alignment; "" where it did."""
     suggests: bool = True
     """Whether the next best place for a keypoint is shown."""
-    views: tuple[SavedView, ...] = ()
-    """Places to look at the room from that people saved; shared by all recordings."""
+    stroke: tuple[int, Annotation] | None = None
+    """The last pull at a colour field, and what it led to: it goes on as the same step while nothing else happens."""
     is_playing: bool = False
     speed: float = 1.0
     """How many seconds of the recording pass in a second of playing."""

@@ -9,11 +9,13 @@ from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
+from gazeloc_app.actions.places import RemoveView, RenameView, SaveView
+from gazeloc_app.actions.views import TintLayer
 from gazeloc_app.annotation import history as history_module
 from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
 from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
 from gazeloc_app.annotation.steps import describe
-from gazeloc_app.state import Annotation, AppState
+from gazeloc_app.state import Annotation, AppState, Layer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,6 +23,7 @@ from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
 from gazeloc_core.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.methods import Method
+from gazeloc_core.saved_views import SavedView
 
 PAIR = KeypointPair(
     "k1", "corner", (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (Sighting(3, 10.5, 20.5),), 0.01, False, (Sighting(1, 2, 3),), 0.2
@@ -31,7 +34,11 @@ OTHER_VALUES = {  # of every field of Annotation; a new field needs one, and per
     "alignment_by_person": True,
     "method": Method.TAGS,
     "marks": FrameMarks((FrameMark(3, Mark.BAD, "too far left"),)),
+    "views": (SavedView("desk", (1.0, 2.0, 3.0), (0.0, 0.0, 1.0), 0.9),),
+    "tints": ((Layer.SCAN, (1, 2, 3)), (Layer.TRUTH, (250, 0, 9))),
 }
+DESK, DOOR = SavedView("desk", (1, 2, 3), (0, 0, 1)), SavedView("door", (3, 2, 1), (0, 0, 1))
+COLORS = st.none() | st.tuples(*[st.integers(0, 255)] * 3)
 actions = st.one_of(
     st.builds(PickPoint, st.sampled_from(Side), st.tuples(*[st.floats(-5, 5)] * 3), st.booleans()),
     st.builds(RenamePair, st.sampled_from(["k1", "k2"]), st.text(max_size=5)),
@@ -40,6 +47,10 @@ actions = st.one_of(
     st.builds(ChooseMethod, st.sampled_from(Method)),
     st.builds(MarkFrame, st.sampled_from(Mark)),
     st.builds(NoteFrame, st.integers(0, 3), st.text(max_size=5)),
+    st.builds(SaveView, st.sampled_from([DESK, DOOR])),
+    st.builds(RenameView, st.sampled_from(["desk", "door"]), st.sampled_from(["desk", "door", "bed"])),
+    st.builds(RemoveView, st.sampled_from(["desk", "door"])),
+    st.builds(TintLayer, st.sampled_from([Layer.SCAN, Layer.TRUTH]), COLORS, st.integers(0, 2)),
     st.builds(Undo),
     st.builds(Undo),
     st.builds(Redo),
@@ -96,6 +107,9 @@ def test_every_field_of_what_people_decide_survives_the_file(name):
         [{"start": {}, "format": "gazeloc-history", "version": 1}, {"step": {"who": 1}}],
         [{"start": {}, "format": "gazeloc-history", "version": 1}, {"step": {"keypoints": [{"key": "k1"}]}}],
         [{"start": {"method": "guess"}, "format": "gazeloc-history", "version": 1}],
+        [{"start": {"tints": {"Scan": [1, 2]}}, "format": "gazeloc-history", "version": 1}],
+        [{"start": {"tints": {"Moon": [1, 2, 3]}}, "format": "gazeloc-history", "version": 1}],
+        [{"start": {"views": [{"name": "desk"}]}, "format": "gazeloc-history", "version": 1}],
         [{"start": []}],
         [7],
     ],
@@ -119,6 +133,12 @@ def test_garbled_lines_are_refused(lines):
         ([ChooseAlignment("abc")], "Alignment abc put in force"),
         ([ChooseAlignment("abc"), ChooseAlignment(None)], "No alignment in force"),
         ([ChooseMethod(Method.TAGS)], "Method tags chosen"),
+        ([SaveView(DESK)], "View “desk” saved"),
+        ([SaveView(DESK), SaveView(replace(DESK, eye=(9, 9, 9)))], "View “desk” saved anew"),
+        ([SaveView(DESK), RenameView("desk", "table")], "View “desk” renamed to “table”"),
+        ([SaveView(DESK), SaveView(DOOR), RemoveView("desk")], "View “desk” removed"),
+        ([TintLayer(Layer.SCAN, (1, 2, 3))], "Colour of Scan changed"),
+        ([TintLayer(Layer.SCAN, (1, 2, 3)), TintLayer(Layer.SCAN, None)], "Colour of Scan put back to its own"),
     ],
 )
 def test_each_step_has_its_sentence(actions, sentence):
@@ -131,3 +151,31 @@ def test_many_changes_at_once_are_counted():
     fewer = KeypointSet((replace(many.pairs[0], enabled=False), *many.pairs[2:]))
     assert describe(Annotation(), Annotation(many)) == "Keypoints: 4 added"
     assert describe(Annotation(many), Annotation(fewer)) == "Keypoints: 1 changed, 1 deleted"
+
+
+def test_a_pull_at_the_colour_field_is_one_step_and_the_next_pull_another():
+    state = AppState(("walk",), "walk")
+    pulls = [TintLayer(Layer.SCAN, (n, 0, 0), stroke=1) for n in range(9)]
+    after = apply(state, *pulls, TintLayer(Layer.SCAN, (0, 9, 0), stroke=2), TintLayer(Layer.SCAN, (0, 8, 0), stroke=2))
+    assert [annotation.tint(Layer.SCAN) for annotation in after.past] == [None, (8, 0, 0)]
+    assert after.annotation.tint(Layer.SCAN) == (0, 8, 0)
+    assert apply(after, Undo()).annotation.tint(Layer.SCAN) == (8, 0, 0)
+    late = TintLayer(Layer.SCAN, (7, 7, 7), stroke=2)
+    assert len(apply(after, Undo(), late).past) == 2, "what comes after an undo is a step of its own"
+    assert len(apply(after, PickPoint(Side.SCAN, (1, 2, 3)), late).past) == 4
+
+
+def test_what_others_did_to_the_room_is_no_step_and_undo_goes_on_with_this_recordings_own():
+    state = apply(
+        AppState(("walk",), "walk"), PickPoint(Side.SCAN, (1, 2, 3)), SaveView(DESK), ChooseMethod(Method.TAGS)
+    )
+    state = apply(state, Undo())
+    meanwhile = Annotation(views=(DESK, DOOR), tints=((Layer.SCAN, (1, 2, 3)),))
+    history = History.of(state).with_room_of(meanwhile)
+    assert (history.position, len(history.annotations)) == (2, 4)
+    assert [len(annotation.views) for annotation in history.annotations] == [0, 0, 2, 2]
+    assert {annotation.tints for annotation in history.annotations} == {meanwhile.tints}
+    assert history.with_room_of(meanwhile) is history
+    assert [annotation.keypoints for annotation in history.annotations] == [
+        a.keypoints for a in History.of(state).annotations
+    ]

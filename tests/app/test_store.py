@@ -170,8 +170,8 @@ def test_a_failing_effect_is_shown():
     assert "no space left" in store.state.notice.text
 
 
-def test_layers_hide_and_tint_independently():
-    layers = LayerSettings().with_visible(Layer.SCAN, False).with_tint(Layer.POINTS, (1, 2, 3))
+def test_layers_hide_one_by_one():
+    layers = LayerSettings().with_visible(Layer.SCAN, False)
     assert not layers.is_visible(Layer.SCAN)
     assert layers.is_visible(Layer.POINTS)
-    assert layers.with_visible(Layer.SCAN, True).with_tint(Layer.POINTS, None) == LayerSettings()
+    assert layers.with_visible(Layer.SCAN, True) == LayerSettings()

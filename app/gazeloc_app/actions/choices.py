@@ -58,10 +58,9 @@ class OpenRecording:
         if self.recording == state.recording:
             return state
         opened = replace(
-            self.history().put_into(AppState(state.recordings, self.recording)),
+            self.history().with_room_of(state.annotation).put_into(AppState(state.recordings, self.recording)),
             layers=state.layers,
             compared=state.compared,
-            views=state.views,
             draws_tags=state.draws_tags,
             suggests=state.suggests,
             data_revision=state.data_revision + 1,

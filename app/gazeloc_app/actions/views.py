@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gazeloc_app.state import AppState, Coloring, Layer, Level
+from gazeloc_core.glb import Rgb
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,18 @@ class TintLayer:
     """A layer was tinted, or got its own colours back."""
 
     layer: Layer
-    tint: tuple[int, int, int] | None
+    tint: Rgb | None
+    stroke: int = 0
+    """Tells one pull at the colour field from the next; 0 for a step of its own."""
 
     def apply(self, state: AppState) -> AppState:
-        """The state with the tint."""
-        return replace(state, layers=state.layers.with_tint(self.layer, self.tint))
+        """The state with the tint; all colours of one pull are one step."""
+        annotation = state.annotation.with_tint(self.layer, self.tint)
+        goes_on = self.stroke and state.stroke is not None and state.stroke[0] == self.stroke
+        if goes_on and state.stroke is not None and state.stroke[1] is state.annotation:
+            return replace(state, annotation=annotation, stroke=(self.stroke, annotation))
+        state = state.annotate(annotation)
+        return replace(state, stroke=(self.stroke, state.annotation)) if self.stroke else state
 
 
 MAX_THINNING = 100

@@ -6,17 +6,37 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
-from gazeloc_app.state import Annotation
+from gazeloc_app.state import Annotation, Layer
 from gazeloc_core.errors import InputError
+from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointSet
+from gazeloc_core.layer_colors import checked_color
 from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
+from gazeloc_core.saved_views import views_from_json, views_to_json
+
+
+def tints_to_json(tints: tuple[tuple[Layer, Rgb], ...]) -> dict[str, list[int]]:
+    """Layers' colours by their names."""
+    return {layer.value: list(tint) for layer, tint in tints}
+
+
+def tints_from_json(value: Any) -> tuple[tuple[Layer, Rgb], ...]:
+    """The same again.
+
+    Raises:
+        ValueError: if a layer is unknown, or a colour is none.
+    """
+    return tuple((Layer(name), checked_color(color)) for name, color in value.items())
+
 
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 CODECS: dict[str, Codec] = {
     "keypoints": (KeypointSet.to_json, KeypointSet.from_json),
     "marks": (FrameMarks.to_json, FrameMarks.from_json),
     "method": (lambda method: method.value, Method),
+    "views": (views_to_json, views_from_json),
+    "tints": (tints_to_json, tints_from_json),
 }
 """To JSON and back, for fields that are not JSON themselves."""
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
-from gazeloc_app.state import MAX_UNDO, Annotation, AppState
+from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import InputError
 
 FORMAT = "gazeloc-history"
@@ -56,6 +56,21 @@ class History:
     def is_same(self, other: History) -> bool:
         """Whether the other holds the very same annotations and stands at the same one."""
         return self.position == other.position and _are_same(self.annotations, other.annotations)
+
+    def with_room_of(self, other: Annotation) -> History:
+        """With what others decided about the room meanwhile, in all steps that know it as the present one does.
+
+        It is no step here: undo goes on to take back what was done in this recording.
+        """
+        history = self
+        for name in ABOUT_THE_ROOM:
+            was, now = getattr(history.present, name), getattr(other, name)
+            if was != now:
+                brought = (
+                    replace(one, **{name: now}) if getattr(one, name) == was else one for one in history.annotations
+                )
+                history = History(tuple(brought), history.position)
+        return history
 
     def then(self, annotation: Annotation) -> History:
         """With one more step, as `AppState.annotate` does it."""

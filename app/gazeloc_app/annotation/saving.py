@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 
 from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
-from gazeloc_app.state import MAX_UNDO, Annotation, AppState
+from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.journal import Journal
 from gazeloc_core.project import Chosen, Project
@@ -52,8 +53,10 @@ class Saver:
         self._committed[recording] = self._wanted[recording] = history
         if not is_settled:
             self._unsettled.add(recording)
-        elif history.present != files:
-            self._wanted[recording] = history.then(files)
+        else:
+            files = replace(files, **{name: getattr(history.present, name) for name in ABOUT_THE_ROOM})
+            if history.present != files:
+                self._wanted[recording] = history.then(files)
         return self._wanted[recording]
 
     @property
@@ -130,7 +133,7 @@ class Saver:
 
 
 def annotation_in_files(project: Project, recording: str) -> Annotation:
-    """What the project's own files say that people decided about a recording."""
+    """What the project's own files say that people decided about a recording; the room has files of its own."""
     chosen = project.settings.chosen.get(recording)
     return Annotation(
         project.keypoints(recording),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-from gazeloc_app.state import Annotation
+from gazeloc_app.state import Annotation, Layer
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.marks import FrameMarks
+from gazeloc_core.saved_views import SavedView
 
 
 def describe(before: Annotation, after: Annotation) -> str:
@@ -22,7 +23,11 @@ def describe(before: Annotation, after: Annotation) -> str:
         found.append(f"Method {after.method} chosen")
     if before.marks != after.marks:
         found.append(_marks(before.marks, after.marks))
-    told = {"keypoints", "marks", "alignment", "alignment_by_person", "method"}
+    if before.views != after.views:
+        found.append(_views(before.views, after.views))
+    if before.tints != after.tints:
+        found.append(_tints(before, after))
+    told = {"keypoints", "marks", "alignment", "alignment_by_person", "method", "views", "tints"}
     others = (field.name for field in fields(Annotation) if field.name not in told)
     found += [
         f"{name.replace('_', ' ').capitalize()} changed"
@@ -57,6 +62,24 @@ def _marks(before: FrameMarks, after: FrameMarks) -> str:
     if earlier is not None and earlier.mark is one.mark:
         return f"Note of frame {frames[0]} changed"
     return f"Frame {frames[0]} marked {one.mark}"
+
+
+def _views(before: tuple[SavedView, ...], after: tuple[SavedView, ...]) -> str:
+    gone, new = [view for view in before if view not in after], [view for view in after if view not in before]
+    if len(gone) > 1 or len(new) > 1:
+        return "Saved views changed"
+    if gone and new:
+        is_same = gone[0].name == new[0].name
+        return f"View “{new[0].name}” saved anew" if is_same else f"View “{gone[0].name}” renamed to “{new[0].name}”"
+    if not gone and not new:
+        return "Saved views put in another order"
+    return f"View “{new[0].name}” saved" if new else f"View “{gone[0].name}” removed"
+
+
+def _tints(before: Annotation, after: Annotation) -> str:
+    layers = [layer for layer in Layer if before.tint(layer) != after.tint(layer)]
+    names = ", ".join(layer.value for layer in layers) or "layers"
+    return f"Colour of {names} " + ("changed" if any(after.tint(layer) for layer in layers) else "put back to its own")
 
 
 def _change(was: KeypointPair, now: KeypointPair) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
+from gazeloc_app.panels.history import UNDONE
 from gazeloc_app.state import AppState
 
 MOUSE = (
@@ -57,6 +58,7 @@ class HelpPanel:
         parts = [
             "<b>Mouse</b>" + _table(MOUSE),
             "<b>Keys</b>" + _table(sorted(commands.values(), key=lambda row: row[1])),
+            f"<b>Undo</b><br>{widgets.text(UNDONE)}<br>",
             "<b>Words</b>" + _table(WORDS, is_key=False),
         ]
         widgets.set_content(self._keys, widgets.box("<br>".join(parts)))

@@ -17,6 +17,12 @@ MAX_SHOWN = 60
 """Steps in the list, around the one in force; the others are reached by going on from there."""
 
 
+UNDONE = (
+    "Every keypoint, alignment, method, mark, saved view and colour of a layer is a step that can be undone. "
+    "What shows and what is hidden, and where a browser looks from, is none."
+)
+
+
 class HistoryPanel:
     """The list of steps, undo and redo."""
 
@@ -43,7 +49,7 @@ class HistoryPanel:
 
 def _list_html(history: History) -> str:
     if len(history.annotations) == 1:
-        return "Nothing was changed yet. Every keypoint, alignment, method and mark becomes a step that can be undone."
+        return f"Nothing was changed yet. {UNDONE}"
     last = min(len(history.annotations), max(history.position + MAX_SHOWN // 2, MAX_SHOWN))
     first = max(0, last - MAX_SHOWN)
     rows = [_row_html(history, step) for step in range(first, last)]

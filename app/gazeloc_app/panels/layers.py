@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -27,6 +28,8 @@ HINTS = {
     Layer.GRID: "Squares of one metre on the floor, and the scan's axes; an arrow marks the one that is up.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
+_SAME_STROKE_S = 1.5
+"""A colour field sends a colour at every movement of the pointer; a rest of so long begins a new step."""
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
 
 
@@ -35,7 +38,9 @@ class LayerPanel:
 
     def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None], facts: Callable[[AppState], tuple[str, ...]]):
         """`facts(state)` are sentences about what is drawn with less than there is."""
-        self._facts = facts
+        self._facts, self._dispatch = facts, dispatch
+        self._stroke, self._pulled_s = 0, 0.0
+        self._puller: object = None
         self._boxes = {}
         for layer in Layer:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=HINTS[layer])
@@ -48,10 +53,16 @@ class LayerPanel:
             )
             self._color = gui.add_rgb("Colour", (255, 160, 60), hint="Instead of the layer's own colours.")
             self._own = gui.add_button("Own colours", hint="Take the tint away.")
-        widgets.on_user(
-            self._color, lambda event: dispatch(TintLayer(Layer(self._which.value), _rgb(event.target.value)))
-        )
+        widgets.on_user(self._color, self._tint)
         widgets.on_user(self._own, lambda _: dispatch(TintLayer(Layer(self._which.value), None)), event="on_click")
+
+    def _tint(self, event: Any) -> None:
+        layer, now = Layer(self._which.value), time.monotonic()
+        puller = (layer, event.client_id)
+        if puller != self._puller or now > self._pulled_s + _SAME_STROKE_S:
+            self._stroke += 1
+        self._puller, self._pulled_s = puller, now
+        self._dispatch(TintLayer(layer, _rgb(event.target.value), self._stroke))
 
     def render(self, state: AppState) -> None:
         """Show the state's layers."""
