@@ -6,16 +6,18 @@ Nothing is aligned to the truth for them; what is, beside the headline, says so 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Floats, Ints, frozen
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.times import nearest_rows
-from gazeloc_core.trajectory import Trajectory
+from gazeloc_core.trajectory import PoseStatus, Trajectory
 from gazeloc_core.trajectory_errors import (
     AbsoluteError,
     ErrorSummary,
@@ -32,6 +34,23 @@ APART_NS, APART_TOLERANCE_NS = 1_000_000_000, 250_000_000
 """RPE over a second: between keyframes whose times differ by a second, give or take half of a keyframe's slot."""
 
 
+@dataclass(frozen=True)
+class StatusErrors:
+    """Errors of the `frames` of one status, keyframes or not, that have a pose and a truth."""
+
+    frames: int
+    rotation_deg: ErrorSummary
+    position_m: ErrorSummary
+
+    def to_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return {
+            "frames": self.frames,
+            "rotation_deg": self.rotation_deg.to_json(),
+            "position_m": self.position_m.to_json(),
+        }
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Errors of one trajectory against the truth.
@@ -39,7 +58,8 @@ class Evaluation:
     `frames` in the recording, `keyframes` that were to be registered, `registered` of those; `without_truth` keyframes
     have no truth within 1 ms and count in no error. `outliers`, `ate_m` and the relative errors `rpe_in_order` (from
     each registered keyframe to the next) and `rpe_per_second` (to the one a second later) are over the registered
-    keyframes that have a truth. For the app, of every frame that has a pose and a truth, interpolated ones included:
+    keyframes that have a truth. `by_status` has the errors of all frames, keyframes or not, by how they came by their
+    pose. For the app, of every frame that has a pose and a truth, interpolated ones included:
     `frame_index` (F,), `frame_rotation_deg` (F,), `frame_position_m` (F,).
     """
 
@@ -53,6 +73,7 @@ class Evaluation:
     ate_m: AbsoluteError
     rpe_in_order: RelativeError
     rpe_per_second: RelativeError
+    by_status: Mapping[PoseStatus, StatusErrors]
     frame_index: Ints
     frame_rotation_deg: Floats
     frame_position_m: Floats
@@ -63,6 +84,7 @@ class Evaluation:
         Keys are added, never renamed or removed. `rotation_deg`, `position_m`: see `ErrorSummary`. `outliers`: see
         `Outliers`, of all compared `frames` those off by more than 2 m or 90°. `ate_m`: root mean squares of the
         position, `unaligned` and after each alignment. `rpe`: `in_order` and `per_second`, see `RelativeError`.
+        `by_status`: of all frames of each status that has any with a pose and a truth.
         """
         return {
             "frames": self.frames,
@@ -74,6 +96,7 @@ class Evaluation:
             "outliers": self.outliers.to_json(),
             "ate_m": self.ate_m.to_json(),
             "rpe": {"in_order": self.rpe_in_order.to_json(), "per_second": self.rpe_per_second.to_json()},
+            "by_status": {status.value: errors.to_json() for status, errors in self.by_status.items()},
         }
 
 
@@ -95,7 +118,7 @@ def match_times(timestamp_ns: Ints, truth_timestamp_ns: Ints) -> Ints:
 def evaluate(trajectory: Trajectory, truth_timestamp_ns: Ints, truth_poses: RigidTransform) -> Evaluation:
     """Compare `trajectory` with the true `scan_from_camera` (T,) at times (T,) on the recording's own clock.
 
-    Registered means localised by itself (`registered` or `tag_only`); an interpolated keyframe is not.
+    Registered means localised by itself (`registered`, `tracked` or `tag_only`); an interpolated keyframe is not.
 
     Raises:
         GeometryError: if no frame has a truth within 1 ms: the truth is of another recording or clock.
@@ -126,10 +149,22 @@ def evaluate(trajectory: Trajectory, truth_timestamp_ns: Ints, truth_poses: Rigi
         ate_m=ate_m,
         rpe_in_order=in_order,
         rpe_per_second=per_second,
+        by_status=_by_status(trajectory.status[comparable], rotation_deg[comparable], position_m[comparable]),
         frame_index=frozen(comparable, np.int64),
         frame_rotation_deg=frozen(rotation_deg[comparable]),
         frame_position_m=frozen(position_m[comparable]),
     )
+
+
+def _by_status(status: NDArray[Any], rotation_deg: Floats, position_m: Floats) -> dict[PoseStatus, StatusErrors]:
+    """The errors (F,) of compared frames with these statuses (F,), by status."""
+    found = {}
+    for one in PoseStatus:
+        of_status = status == one.value
+        if of_status.any():
+            summaries = (ErrorSummary.of(errors[of_status]) for errors in (rotation_deg, position_m))
+            found[one] = StatusErrors(int(of_status.sum()), *summaries)
+    return found
 
 
 def _path_errors(

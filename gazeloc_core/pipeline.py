@@ -124,11 +124,14 @@ def run(
 
 
 def run_after_choice(project: Project, recording: str, method: Method, report: Report = silent) -> None:
-    """Run what follows a choice that a person made in the app: poses and gaze, and for `sfm` the smaller pieces."""
-    names = ("pieces", "trajectory", "gaze") if method is Method.SFM else ("trajectory", "gaze")
-    for number, name in enumerate(names):
-        share = part(report, number / len(names), (number + 1) / len(names))
-        run_stage(project, stage_named(name, method=method), recording, share)
+    """Run what follows a choice that a person made in the app: poses and gaze, and for `sfm` smaller pieces and the
+    frames between keyframes."""
+    names = ("pieces", "tracking", "trajectory", "gaze") if method is Method.SFM else ("trajectory", "gaze")
+    stages = [stage for stage in (stage_named(name, method=method) for name in names) if stage.is_needed(project)]
+    total, done = sum(stage.weight for stage in stages), 0.0
+    for stage in stages:
+        run_stage(project, stage, recording, part(report, done / total, (done + stage.weight) / total))
+        done += stage.weight
 
 
 def score(project: Project, recording: str, method: Method = Method.SFM, report: Report = silent) -> FrameScores:

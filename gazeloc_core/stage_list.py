@@ -2,7 +2,7 @@
 
 scan       colors ─ tags ─ corners ───────────────────────────┐
 recording  keyframes ─ undistorted ┬ tags ─────────┬ corners ─┴ alignment ─ refinement ─ trajectory ─ gaze
-                                   └ reconstruction ┴ anchoring ─ tracking ─┘ (of each method)
+                                   └ reconstruction ┴ anchoring ─ tracking ───────────────┘   (of each method)
 """
 
 from __future__ import annotations
@@ -148,6 +148,15 @@ _SHARED: tuple[Stage, ...] = (
         is_needed=_has_tags,
     ),
     Stage(
+        name="tracking",
+        title="Track the frames between keyframes",
+        methods=SFM,
+        weight=15,
+        run=lambda project, name, report: tracking.track_between(project, name, report=report),
+        inputs=tracking.tracking_inputs,
+        is_needed=lambda project: project.settings.track_frames,
+    ),
+    Stage(
         name="alignment",
         title="Align to the scan",
         methods=SFM,
@@ -169,15 +178,6 @@ _SHARED: tuple[Stage, ...] = (
         methods=SFM,
         run=lambda project, name, report: pieces.align_pieces(project, name, report=report),
         inputs=pieces.piece_inputs,
-    ),
-    Stage(
-        name="tracking",
-        title="Track the frames between keyframes",
-        methods=SFM,
-        weight=15,
-        run=lambda project, name, report: tracking.track_between(project, name, report=report),
-        inputs=tracking.tracking_inputs,
-        is_needed=lambda project: project.settings.track_frames,
     ),
 )
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from gazeloc_app.terminal import progress_bar, table
 from gazeloc_core import pipeline
 from gazeloc_core.errors import InputError, ProjectError
+from gazeloc_core.evaluate import Evaluation
 from gazeloc_core.methods import method_named
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
 from gazeloc_core.protocol import ProtocolOptions, make_protocol_project
@@ -134,6 +135,23 @@ def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json
         for name, method, e in each
     ]
     print(f"\n{table(head, rows)}")
+    print(f"\n{_table_by_status(each)}")
+
+
+def _table_by_status(each: Sequence[tuple[str, str, Evaluation]]) -> str:
+    """All frames, keyframes or not, by how they came by their pose."""
+    head = ["recording", "method", "all frames", "with truth"]
+    head += [f"{what} {unit}" for unit in ("cm", "°") for what in ("mean", "p95", "max")]
+    rows = [
+        [
+            *(name, method, status.value.replace("_", " "), str(errors.frames)),
+            *_cells(errors.position_m, ("mean", "p95", "max"), 100),
+            *_cells(errors.rotation_deg, ("mean", "p95", "max")),
+        ]
+        for name, method, e in each
+        for status, errors in e.by_status.items()
+    ]
+    return table(head, rows)
 
 
 def protocol(

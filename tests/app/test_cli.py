@@ -126,10 +126,10 @@ def test_status_is_one_json_object_and_changes_nothing(capsys, home: Path):
         ("keyframes", "fresh"),
         ("undistorted", "fresh"),
         ("reconstruction", "fresh"),
+        ("tracking", "missing"),
         ("alignment", "missing"),
         ("refinement", "missing"),
         ("pieces", "missing"),
-        ("tracking", "missing"),
         ("trajectory", "missing"),
         ("gaze", "missing"),
     ]
@@ -156,7 +156,7 @@ def test_evaluate_is_one_json_object(capsys, home: Path):
 
 
 def test_evaluate_prints_errors_and_then_errors_along_the_path(capsys, home: Path):
-    first, second = answer(capsys, "evaluate", home / "aligned").split("\n\n")
+    first, second, third = answer(capsys, "evaluate", home / "aligned").split("\n\n")
     head, _, row = first.splitlines()
     assert row.split()[:5] == ["walk", "sfm", "12", "2", "2"]
     assert len(head.split()) == 5 + 2 * 8  # each of the eight statistics has its unit beside it
@@ -165,6 +165,10 @@ def test_evaluate_prints_errors_and_then_errors_along_the_path(capsys, home: Pat
     assert "after Sim3" in head
     assert row.split()[2:5] == ["0", "of", "2"]
     assert row.split()[5:] == ["0.00", "–", "–", "0.00", "0.00", "–", "–"]  # two poses tell nothing after an alignment
+    assert [row.split()[:4] for row in third.splitlines()[2:]] == [
+        ["walk", "sfm", "registered", "2"],
+        ["walk", "sfm", "interpolated", "5"],
+    ]
 
 
 def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):

@@ -20,6 +20,7 @@ from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.stages import inputs, registration
+from gazeloc_core.trajectory import PoseStatus
 from gazeloc_core.truth import read_tum
 
 STUDIO = SAMPLE_SCENES / "studio"
@@ -40,6 +41,15 @@ def test_errors_against_the_truth_are_within_the_targets(project: Project):
     assert evaluation.position_m.mean <= 0.015
     assert evaluation.rotation_deg.mean <= 0.25
     assert evaluation.registered >= 0.95 * evaluation.keyframes
+
+
+def test_frames_between_keyframes_are_as_good_as_keyframes(project: Project):
+    evaluation = pipeline.evaluate_recording(project, "glasses")
+    tracked = evaluation.by_status[PoseStatus.TRACKED]
+    assert tracked.frames >= 0.95 * (evaluation.frames - evaluation.by_status[PoseStatus.REGISTERED].frames)
+    assert tracked.position_m.mean <= 0.012
+    assert tracked.rotation_deg.mean <= 0.35
+    assert tracked.rotation_deg.max <= 1.0
 
 
 def test_everything_is_fresh_and_a_second_run_does_nothing(project: Project):

@@ -20,7 +20,7 @@ TIMES = 1_700_000_000_000_000_000 + 33_333_333 * np.arange(20)
 
 def trajectory_of(status, keyframes, shift_m=0.0) -> Trajectory:
     status = np.array(status)
-    has_pose = np.flatnonzero(np.isin(status, ["registered", "interpolated", "tag_only"]))
+    has_pose = np.flatnonzero(np.isin(status, ["registered", "tracked", "interpolated", "tag_only"]))
     poses = camera_poses(20)[has_pose]
     shift = np.broadcast_to(np.asarray(shift_m, float), (20,))[has_pose]
     moved = RigidTransform.from_components(poses.translation + shift[:, None] * [0, 0, 1], poses.rotation)
@@ -83,6 +83,28 @@ def test_only_keyframes_that_were_localised_themselves_count():
     np.testing.assert_allclose(evaluation.frame_position_m, [0.1, 0.3, 9, 9])
 
 
+def test_all_frames_are_told_apart_by_how_they_came_by_their_pose():
+    """Keyframes or not; nothing of one status counts for another, and what has no pose is in none."""
+    status = ["registered", "tracked", "tracked", "interpolated", "none"] + ["none"] * 15
+    shift = np.array([0.1, 0.2, 0.4, 9, 0] + [0] * 15)
+    evaluation = evaluate(trajectory_of(status, [0], shift), TIMES, camera_poses(20))
+    found = evaluation.to_json()["by_status"]
+    assert {name: errors["frames"] for name, errors in found.items()} == {
+        "registered": 1,
+        "tracked": 2,
+        "interpolated": 1,
+    }
+    assert found["tracked"]["position_m"]["mean"] == pytest.approx(0.3)
+    assert found["interpolated"]["position_m"]["max"] == pytest.approx(9)
+    assert evaluation.position_m.mean == pytest.approx(0.1)
+
+
+def test_a_keyframe_that_was_tracked_counts_as_registered():
+    status = ["registered", "tracked"] + ["none"] * 18
+    evaluation = evaluate(trajectory_of(status, [0, 1, 2]), TIMES, camera_poses(20))
+    assert (evaluation.keyframes, evaluation.registered) == (3, 2)
+
+
 def test_p95_is_infinite_when_more_than_one_keyframe_in_twenty_failed():
     errors = np.linspace(0.01, 1.0, 100)
     assert ErrorSummary.of(errors).p95 == pytest.approx(np.percentile(errors, 95))
@@ -97,7 +119,8 @@ def test_json_is_strict_and_null_means_infinite():
     evaluation = evaluate(trajectory_of(["none"] * 20, range(20)), TIMES, camera_poses(20))
     value = json.loads(json.dumps(evaluation.to_json(), allow_nan=False))
     first_keys = ["frames", "keyframes", "registered", "without_truth", "rotation_deg", "position_m"]
-    assert list(value) == [*first_keys, "outliers", "ate_m", "rpe"]
+    assert list(value) == [*first_keys, "outliers", "ate_m", "rpe", "by_status"]
+    assert value["by_status"] == {}
     assert value["registered"] == 0
     assert value["position_m"] == dict.fromkeys(["mean", "median", "p75", "p90", "p95", "max"])
     assert value["outliers"] == {"frames": 0, "position": 0, "rotation": 0, "count": 0, "share": None}
