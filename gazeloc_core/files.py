@@ -14,15 +14,20 @@ from gazeloc_core.errors import InputError
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Replace a text file in one step; on return the new one is on the disk.
+    """Replace a text file in one step, see `write_bytes_atomically`."""
+    write_bytes_atomically(path, text.encode("utf-8"))
+
+
+def write_bytes_atomically(path: Path, content: bytes) -> None:
+    """Replace a file in one step; on return the new one is on the disk.
 
     The order matters: content first, then the name, then the folder that holds the name. Else a power cut could leave
     the new name with nothing in it, or bring the old file back.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with part.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(text)
+    with part.open("wb") as file:
+        file.write(content)
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)

@@ -32,7 +32,7 @@ from gazeloc_core.sfm_model import PlacedModel, SfmModel, TrackedFrames
 from gazeloc_core.stages import inputs, registration
 from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
-from gazeloc_core.stages.scores import FrameScores, load_scores
+from gazeloc_core.stages.scores import FORMULA, FrameScores, load_scores
 from gazeloc_core.stages.tracking import load_tracked
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import Trajectory
@@ -255,7 +255,8 @@ class ProjectData:
         def load() -> FrameScores | None:
             trajectory = poses.header()
             of_these = method is not Method.SFM or trajectory.inputs.get("alignment") == key
-            is_current = artifact.header().inputs.get("trajectory") == trajectory.content
+            made_of = artifact.header().inputs
+            is_current = made_of.get("trajectory") == trajectory.content and made_of.get("formula") == FORMULA
             return load_scores(artifact, count) if of_these and is_current else None
 
         return self._remember_or_say(f"{recording} {method} scores", (stamp, _stamp(poses), key), load)

@@ -1,30 +1,35 @@
 """Stage: how well every frame with a pose agrees with the render of the scan from it, by one method's poses.
 
-Scoring a long recording takes minutes. What is done is kept beside the artifact every few seconds, so that work that
-was cancelled or killed goes on where it was.
+Some hundred frames, evenly over the recording, are compared first: together they tell where the scan is off itself
+(`scan_distortion`), and that is not held against any frame. Scoring a long recording takes minutes; what is done is
+kept every few seconds, so that work that was cancelled or killed goes on where it was.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.agreement import AgreementOptions, FrameScorer
-from gazeloc_core.arrays import Bools, Floats
+from gazeloc_core.arrays import Bools, Floats, Ints
 from gazeloc_core.artifacts import Artifact
-from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.errors import ProjectError
 from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
+from gazeloc_core.recording import Recording
+from gazeloc_core.scan_distortion import ScanDistortion, scan_distortion
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.begun_scores import COLUMNS, BegunScores
+from gazeloc_core.trajectory import Trajectory
 
-_KEEP_EVERY_S = 5.0
+FORMULA = "2"
+"""Changes whenever the same frames get other scores."""
+_COMPARED_FRAMES = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +38,11 @@ class FrameScores:
 
     score: Floats
     offset_deg: Floats
+    shift_m: Floats
+    shift_sigma_m: Floats
+    turn_deg: Floats
+    turn_sigma_deg: Floats
+    scan_shift_m: Floats
 
     @property
     def known(self) -> Floats:
@@ -52,33 +62,77 @@ def score_frames(
     opened, depends = inputs.load_recording(project, recording), score_inputs(project, recording, method)
     trajectory = inputs.load_trajectory(project.result(recording, method, "trajectory").read_arrays())
     artifact = project.result(recording, method, "scores")
-    kept = _Kept(artifact, hash_of_value([depends, asdict(options)]), len(trajectory))
-    todo = np.flatnonzero(trajectory.has_pose & ~kept.is_done)
-    if len(todo):
-        scorer = FrameScorer(inputs.load_mesh(project), opened.camera, options)
-        try:
-            for number, (index, rgb) in enumerate(opened.frames.iterate(todo.tolist())):
-                report(number / len(todo), f"frame {index}")
-                pose = trajectory.poses(np.array([index]))[0]
-                found = scorer.score(rgb, pose)
-                kept.put(index, found.score, found.offset_deg)
-        finally:
-            kept.save()
-    scores = FrameScores(kept.score, kept.offset_deg)
+    path, key = artifact.folder.with_name("scores.begun.npz"), hash_of_value([depends, asdict(options)])
+    begun = BegunScores(path, key, len(trajectory))
+    run = _Run(opened, trajectory, FrameScorer(inputs.load_mesh(project), opened.camera, options), begun, report)
+    try:
+        distortion = run.compare()
+        run.score_all(distortion)
+    finally:
+        begun.save()
+    scores = FrameScores(**begun.columns())
     artifact.write_arrays(
-        {"score": scores.score, "offset_deg": scores.offset_deg},
+        {**begun.columns(), **_distortion_arrays(distortion)},
         options=asdict(options),
         inputs=depends,
         stats=_stats(scores, trajectory.has_pose),
     )
-    kept.forget()
+    begun.forget()
     return scores
+
+
+class _Run:
+    """The work of one run: frames are matched once, their tiles give the scan's distortion, then the scores."""
+
+    def __init__(
+        self, opened: Recording, trajectory: Trajectory, scorer: FrameScorer, begun: BegunScores, report: Report
+    ):
+        self._opened, self._trajectory, self._scorer = opened, trajectory, scorer
+        self._begun, self._report = begun, report
+        self._with_pose = np.flatnonzero(trajectory.has_pose)
+        rows = np.linspace(0, len(self._with_pose) - 1, min(len(self._with_pose), _COMPARED_FRAMES)).round().astype(int)
+        self._compared = self._with_pose[rows]
+        self._matched = len({*begun.tiles, *np.flatnonzero(begun.is_done).tolist()})
+
+    def compare(self) -> ScanDistortion | None:
+        """Where the scan is off itself, by frames that are spread evenly over the recording."""
+        todo = [index for index in self._compared.tolist() if index not in self._begun.tiles]
+        for index, rgb in self._opened.frames.iterate(todo):
+            self._say(index)
+            self._begun.put_tiles(index, self._scorer.match(rgb, self._pose(index)))
+        equations = [self._scorer.equations(self._begun.tiles[i], self._pose(i)) for i in self._compared.tolist()]
+        return scan_distortion([one for one in equations if one is not None])
+
+    def score_all(self, distortion: ScanDistortion | None) -> None:
+        """Score all frames that are not scored yet; those that were compared are not matched again."""
+        for index in self._compared.tolist():
+            tiles = self._begun.tiles[index]
+            self._begun.put(index, self._scorer.judge(self._scorer.equations(tiles, self._pose(index)), distortion))
+        todo: Ints = self._with_pose[~self._begun.is_done[self._with_pose]]
+        for index, rgb in self._opened.frames.iterate(todo.tolist()):
+            self._say(index)
+            self._begun.put(index, self._scorer.score(rgb, self._pose(index), distortion))
+
+    def _pose(self, index: int) -> RigidTransform:
+        return self._trajectory.poses(np.array([index]))[0]
+
+    def _say(self, index: int) -> None:
+        self._report(self._matched / len(self._with_pose), f"frame {index}")
+        self._matched += 1
+
+
+def _distortion_arrays(distortion: ScanDistortion | None) -> dict[str, Floats]:
+    """Where the scan is off, for whoever wants to look at it: (K, 3) places and displacements, metres, scan axes."""
+    if distortion is None:
+        return {}
+    return {"scan_place": distortion.nodes, "scan_displacement_m": distortion.displacement_m}
 
 
 def score_inputs(project: Project, recording: str, method: Method = Method.SFM) -> dict[str, str]:
     """The hashes that the scores depend on."""
     colors = project.scan_artifact("colors")
     return {
+        "formula": FORMULA,
         "scan": inputs.scan_hash(project),
         "colors": colors.header().content if colors.exists else "of the scan's file",
         "recording": inputs.recording_hash(project, recording),
@@ -93,54 +147,12 @@ def load_scores(artifact: Artifact, count: int) -> FrameScores:
         ProjectError: if they are missing, damaged, or of another number of frames.
     """
     arrays = artifact.read_arrays()
-    if any(arrays.get(name, np.zeros(0)).shape != (count,) for name in ("score", "offset_deg")):
+    if any(arrays.get(name, np.zeros(0)).shape != (count,) for name in COLUMNS):
         raise ProjectError(f"{artifact.folder}: the scores are not of {count} frames; remove it and score again.")
-    return FrameScores(arrays["score"], arrays["offset_deg"])
+    return FrameScores(**{name: arrays[name] for name in COLUMNS})
 
 
 def _stats(scores: FrameScores, has_pose: Bools) -> Mapping[str, float | int]:
     known = scores.known
     counts: dict[str, float | int] = {"frames with a pose": int(has_pose.sum()), "scored": len(known)}
     return counts | ({"median": round(float(np.median(known)), 4)} if len(known) else {})
-
-
-class _Kept:
-    """What is done so far, in a file beside the artifact; one of other inputs, or a damaged one, is not used."""
-
-    def __init__(self, artifact: Artifact, key: str, count: int):
-        self._path: Path = artifact.folder.with_name("scores.begun.json")
-        self._key = key
-        self._saved_at = time.monotonic()
-        self.score, self.offset_deg = np.full(count, np.nan), np.full(count, np.nan)
-        self.is_done = np.zeros(count, np.bool_)
-        if self._path.is_file():
-            self._load()
-
-    def put(self, index: int, score: float, offset_deg: float) -> None:
-        self.score[index], self.offset_deg[index], self.is_done[index] = score, offset_deg, True
-        if time.monotonic() - self._saved_at > _KEEP_EVERY_S:
-            self.save()
-
-    def save(self) -> None:
-        done = np.flatnonzero(self.is_done)
-        rows = [[int(i), _json_number(self.score[i]), _json_number(self.offset_deg[i])] for i in done]
-        write_json_atomically(self._path, {"of": self._key, "frames": rows})
-        self._saved_at = time.monotonic()
-
-    def forget(self) -> None:
-        self._path.unlink(missing_ok=True)
-
-    def _load(self) -> None:
-        try:
-            value = read_json(self._path, "scores that were begun")
-            rows = np.array(value["frames"], dtype=np.float64).reshape(-1, 3)  # null becomes NaN
-            index = rows[:, 0].astype(np.int64)
-            if value["of"] != self._key or (index < 0).any() or (index >= len(self.score)).any():
-                return
-        except (InputError, KeyError, TypeError, ValueError):
-            return
-        self.score[index], self.offset_deg[index], self.is_done[index] = rows[:, 1], rows[:, 2], True
-
-
-def _json_number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -193,10 +193,12 @@ def test_score_lists_the_frames_that_agree_least(capsys, project: Project):
     assert [row["frame_index"] for row in value["worst"]] == np.argsort(scores.score)[:15].tolist()
     summary, worst = answer(capsys, "score", project.folder, "--worst", 15).split("\n\n")
     assert summary.splitlines()[2].split()[:5] == ["walk", "sfm", str(FRAMES), "15", "15"]
-    rows = {row.split()[0]: row.split(maxsplit=6) for row in worst.splitlines()[3:]}
+    rows = {row.split()[0]: row.split(maxsplit=10) for row in worst.splitlines()[3:]}
     assert len(rows) == 15
-    assert rows["3"][4:] == ["registered" if 3 % 2 == 0 else "interpolated", "bad", "too far left"]
+    assert rows["3"][8:] == ["registered" if 3 % 2 == 0 else "interpolated", "bad", "too far left"]
     assert float(rows["3"][2]) == pytest.approx(scores.score[3], abs=0.005)
+    assert float(rows["3"][3]) == pytest.approx(100 * scores.shift_m[3], abs=0.05)
+    assert value["worst"][0]["score"] == np.nanmin(scores.score)
     assert "agree least" not in answer(capsys, "score", project.folder, "--worst", 0)
 
 

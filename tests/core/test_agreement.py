@@ -6,7 +6,7 @@ import pytest
 from app_project import LENS, make_app_project, room_mesh, true_poses
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from gazeloc_core.agreement import FrameScorer
+from gazeloc_core.agreement import LOW_SCORE, FrameScorer
 from gazeloc_core.errors import Cancelled
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import SCORES, run_after_choice, run_stage
@@ -36,7 +36,7 @@ def test_the_true_pose_agrees_whatever_the_exposure_and_some_blur(scorer, frame)
     dark = (cv2.GaussianBlur(frame, (0, 0), 1.5) * 0.4 + 20).astype(np.uint8)
     for picture in (frame, dark):
         found = scorer.score(picture, POSE)
-        assert found.score > 0.85
+        assert found.score > 0.7
         assert found.offset_deg < 0.2  # a pixel is 0.22°
 
 
@@ -76,32 +76,40 @@ def test_every_frame_with_a_pose_is_scored_and_the_others_are_not(project):
     has_pose = np.isfinite(trajectory["centers"]).all(axis=1)
     assert has_pose.sum() > 5
     np.testing.assert_array_equal(np.isfinite(found.score), has_pose)
-    assert found.score[has_pose].min() > 0.6
+    assert found.score[has_pose].min() > LOW_SCORE
 
 
-def test_what_was_scored_before_a_cancel_is_not_scored_again(project, monkeypatch):
+@pytest.mark.parametrize("at", [5, 12])  # while frames are compared with each other, and after
+def test_what_was_scored_before_a_cancel_is_not_scored_again(project, monkeypatch, at):
     asked = []
-    real = FrameScorer.score
+    real = FrameScorer.match
 
     def counted(self, rgb, pose):
         asked.append(pose)
         return real(self, rgb, pose)
 
     def cancel_at_the_fifth(fraction, text="", /):
-        if len(asked) == 5 and fraction > 0:
+        if len(asked) == at and fraction > 0:
             raise Cancelled("Cancelled.")
 
-    monkeypatch.setattr(FrameScorer, "score", counted)
+    monkeypatch.setattr(scores, "_COMPARED_FRAMES", 9)
+    monkeypatch.setattr(FrameScorer, "match", counted)
     with pytest.raises(Cancelled):
         scores.score_frames(project, "walk", report=cancel_at_the_fifth)
     assert not project.result("walk", Method.SFM, "scores").exists
     found = scores.score_frames(project, "walk")
+    assert np.isfinite(found.score).sum() == 15
     assert len(asked) == np.isfinite(found.score).sum()
     assert not list((project.folder / "recordings" / "walk" / "sfm").glob("scores.begun*"))
 
 
 def test_a_damaged_file_of_what_was_begun_is_not_used(project):
     folder = project.folder / "recordings" / "walk" / "sfm"
-    for text in ("{", '{"of": "another", "frames": [[0, 0.5, 0.1]]}', '{"frames": [["x"]]}', "[]"):
-        (folder / "scores.begun.json").write_text(text)
-        assert np.isfinite(scores.score_frames(project, "walk").score).any()
+    expected = scores.score_frames(project, "walk")
+    path = folder / "scores.begun.npz"
+    for arrays in ({}, {"of": np.array("another"), "done": np.arange(3)}, {"of": np.array([1, 2])}):
+        np.savez(path, **arrays)
+        np.testing.assert_array_equal(scores.score_frames(project, "walk").score, expected.score)
+    for content in (b"", b"PK", b"[]"):
+        path.write_bytes(content)
+        np.testing.assert_array_equal(scores.score_frames(project, "walk").score, expected.score)

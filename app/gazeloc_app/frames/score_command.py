@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from gazeloc_core.project import Project
 from gazeloc_core.stages.poses import fresh_trajectory
 from gazeloc_core.stages.scores import FrameScores
 from gazeloc_core.trajectory import Trajectory
+
+_HEAD = ("frame", "time s", "agreement", "off cm", "±", "off °", "±", "scan off cm", "pose", "mark", "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ def score(folder: Path, *, method: str | None, recording: str | None, worst: int
     for one in found:
         if frames := one.worst(worst):
             print(f"\n{one.recording}, {one.method}: the frames that agree least")
-            print(table(["frame", "time s", "agreement", "looks off °", "pose", "mark", ""], _rows(one, frames)))
+            print(table(_HEAD, _rows(one, frames)))
 
 
 def _summary(one: _Scored) -> list[str]:
@@ -80,7 +82,11 @@ def _rows(one: _Scored, frames: list[int]) -> list[list[str]]:
                 str(frame),
                 f"{(int(times[frame]) - int(times[0])) / 1e9:.2f}",
                 f"{one.scores.score[frame]:.2f}",
-                f"{one.scores.offset_deg[frame]:.2f}",
+                f"{100 * one.scores.shift_m[frame]:.1f}",
+                f"{100 * one.scores.shift_sigma_m[frame]:.1f}",
+                f"{one.scores.turn_deg[frame]:.2f}",
+                f"{one.scores.turn_sigma_deg[frame]:.2f}",
+                f"{100 * one.scores.scan_shift_m[frame]:.1f}",
                 str(one.trajectory.status[frame]),
                 "" if mark is None else mark.mark.value,
                 "" if mark is None else mark.note,
@@ -90,7 +96,7 @@ def _rows(one: _Scored, frames: list[int]) -> list[list[str]]:
 
 
 def _json(one: _Scored, worst: int) -> dict[str, Any]:
-    known = one.scores.known
+    known, columns = one.scores.known, asdict(one.scores)
     return {
         "frames": len(one.trajectory),
         "with_a_pose": int(one.trajectory.has_pose.sum()),
@@ -101,8 +107,7 @@ def _json(one: _Scored, worst: int) -> dict[str, Any]:
             {
                 "frame_index": frame,
                 "timestamp_ns": int(one.trajectory.timestamp_ns[frame]),
-                "agreement": float(one.scores.score[frame]),
-                "offset_deg": float(one.scores.offset_deg[frame]),
+                **{name: float(values[frame]) for name, values in columns.items()},
             }
             for frame in one.worst(worst)
         ],

@@ -15,6 +15,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import CompareWith, DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
+from gazeloc_app.frames.offset_text import offset_text
 from gazeloc_app.frames.sightings import image_of_frame
 from gazeloc_app.frames.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
@@ -119,7 +120,7 @@ class FramePanel:
         found = self._data.frame_scores(state.recording, self._data.poses_key(state.recording, state.annotation))
         if found is None or not np.isfinite(found.score[frame]):
             return ""
-        return f"Agreement with the scan: {found.score[frame]:.2f}; it looks {found.offset_deg[frame]:.2f}° off."
+        return f"Agreement with the scan: {found.score[frame]:.2f}. {offset_text(found, frame)}"
 
     def _error_text(self, state: AppState, frame: int) -> str:
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
