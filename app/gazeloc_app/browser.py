@@ -30,6 +30,8 @@ from gazeloc_core.keypoints import Point
 from gazeloc_core.viewpoint import room_corners
 
 SHIFT = "shift"
+_IN_PAGE = {True: '<div id="gazeloc-tool" data-aims hidden></div>', False: '<div id="gazeloc-tool" hidden></div>'}
+"""Tells the page's lens whether the tool in hand aims."""
 
 
 class Browser:
@@ -119,6 +121,7 @@ class Browser:
         )
         self._move = gui.add_checkbox("Move point", False, hint="The click moves the selected pair's point.")
         self._snap = gui.add_checkbox("Snap to tags", True, hint="A click near a tag's centre or corner means that.")
+        self._in_page = gui.add_html(_IN_PAGE[False])
         widgets.on_user(self._choice, lambda _: self._take())
         toggle = gui.add_command("Next tool", hotkey="P", description="What a click does")
         widgets.on_user(toggle, lambda _: self._next_tool(), event="on_trigger")
@@ -132,6 +135,7 @@ class Browser:
         return clicked
 
     def _take(self) -> None:
+        widgets.set_content(self._in_page, _IN_PAGE[self.tool.aims])
         if self._in_hand is not self.tool:
             self._in_hand.put_away()
             self._in_hand = self.tool

@@ -11,7 +11,7 @@ from app_project import MARKS, SFM_FROM_SCAN, make_app_project
 from app_steps import step, stop
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
-from gazeloc_app.keypoints.loupe import add_loupe_route, loupe_url, pose_facing
+from gazeloc_app.keypoints.loupe import add_loupe_route, loupe_places, loupe_url, pose_facing
 from gazeloc_app.panels.loupe import LoupePanel
 from gazeloc_app.routes import Routes
 
@@ -34,7 +34,7 @@ def routes(app):
 
 
 def test_the_middle_of_the_loupe_is_the_place_and_its_edges_are_what_is_around(app, routes):
-    reply = asyncio.run(routes.answer(loupe_url(app.data, app.store.state, RED_MARK)))
+    reply = asyncio.run(routes.answer(loupe_url(*loupe_places(app.data, app.store.state, RED_MARK), 0)))
     picture = cv2.cvtColor(cv2.imdecode(np.frombuffer(reply.body, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
     assert picture.shape == (320, 320, 3)
     color = np.array(MARKS[2][2])

@@ -35,10 +35,9 @@ FARTHEST = 1e4
 _KEPT_S = 300
 
 
-def loupe_url(data: ProjectData, state: AppState, in_scan: Point) -> str:
-    """The URL of the scan around a place, seen from where a camera that had it in view stood."""
-    at, start = loupe_places(data, state, in_scan)
-    return f"/loupe.jpg?at={quote(at)}&from={quote(start)}&rev={state.data_revision}"
+def loupe_url(at: str, start: str, revision: int) -> str:
+    """The URL of the scan around a place, seen from another (see `loupe_places`)."""
+    return f"/loupe.jpg?at={quote(at)}&from={quote(start)}&rev={revision}"
 
 
 def loupe_places(data: ProjectData, state: AppState, in_scan: Point) -> tuple[str, str]:

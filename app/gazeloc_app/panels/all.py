@@ -112,7 +112,6 @@ MAIN_TABS = (
         "Keypoints",
         (
             lambda desk: KeypointPanel(desk.gui, desk.state, desk.data, desk.dispatch),
-            lambda desk: LoupePanel(desk.gui, desk.data),
             lambda desk: SuggestionPanel(
                 desk.gui, Proposals(desk.data), desk.dispatch, desk.go_to, SuggestionLayer(desk.server.scene).show
             ),
@@ -148,13 +147,13 @@ SIDE_TABS = (
 
 
 class Panels:
-    """All panels of one app: the main one on the right with the jobs above its tabs, the other one on the left."""
+    """All panels of one app: the main one on the right, jobs and loupe above its tabs, the other on the left."""
 
     def __init__(self, desk: Desk):
         gui = desk.gui
         gui.main_panel.dock_right()
         gui.main_panel.set_width(MAIN_WIDTH_PX)
-        self._parts: list[Panel] = [JobBar(gui, desk.dispatch)]
+        self._parts: list[Panel] = [JobBar(gui, desk.dispatch), LoupePanel(gui, desk.data)]
         self._add(gui.add_tab_group(order=1000), MAIN_TABS, desk)
         side = gui.add_panel()
         self._add(side, SIDE_TABS, desk)

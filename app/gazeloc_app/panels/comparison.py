@@ -50,7 +50,8 @@ class ComparisonHtml:
         camera = self._data.camera(state.recording)
         if camera is None or not state.layers.is_visible(Layer.KEYPOINTS):
             return ""
-        return marks_svg(*marks_in_frame(self._data, state, Side.SFM, frame), camera, state.selected_key)
+        marks, lines = marks_in_frame(self._data, state, Side.SFM, frame)
+        return marks_svg(marks, lines, camera, state.selected_key, frame)
 
     def _pictures(self, state: AppState, frame: int, other: tuple[str, str | None] | None) -> dict[str, str]:
         key = self._data.poses_key(state.recording, state.annotation)

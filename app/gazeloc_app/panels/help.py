@@ -16,7 +16,9 @@ MOUSE = (
     ("right drag", "move the view"),
     ("wheel", "nearer, farther"),
     ("click", "what “A click” says, at the top right"),
-    ("Shift click", "set a point, on the scan or in the frame that is looked through"),
+    ("Shift click", "set a point: on the scan, in the panel “Frame”, or in the frame that is looked through"),
+    ("Shift", "a lens at the pointer"),
+    ("drag a marker", "move a keypoint: on the scan, in the reconstruction, or its click in the panel “Frame”"),
     ("Ctrl K", "find a command by its name"),
 )
 NAMES = {"arrowleft": "←", "arrowright": "→", "arrowup": "↑", "arrowdown": "↓"}

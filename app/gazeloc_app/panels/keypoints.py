@@ -23,8 +23,8 @@ RULES = (
 
 NONE_YET = widgets.card(
     "No keypoint yet.",
-    "Hold Shift and click a spot on the scan, then that spot of the reconstruction: among its points, or in two frames "
-    "that you look through. “A click” above says what a click does.",
+    "Hold Shift and click a spot on the scan, then that spot in two keyframes in the panel “Frame”, or among the "
+    "points of the reconstruction. “A click” above says what a click does.",
 )
 LEGEND = (
     f'<div style="color:{widgets.MUTED}">cm and px: how far the two sides are apart. left out: the same in cm where '

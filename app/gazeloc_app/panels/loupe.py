@@ -1,6 +1,7 @@
-"""Part of the panel of keypoints: the selected one under a loupe, on the scan and in frames that see it.
+"""The selected keypoint under a loupe, on the scan and in frames that see it: a small window over the 3D view.
 
-The frames are enlarged by CSS, from pictures that the page mostly has already.
+The page gives it its place, and tells where in it was clicked (static/page/loupe.js). The frames are enlarged by CSS,
+from pictures that the page mostly has already.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.frame_marks import Mark, marks_in_frame
-from gazeloc_app.keypoints.loupe import ACROSS_M, loupe_url
+from gazeloc_app.keypoints.loupe import ACROSS_M, loupe_places, loupe_url
 from gazeloc_app.state import AppState
 from gazeloc_core.camera import Camera
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
@@ -25,7 +26,8 @@ MOST_FRAMES = 2
 """Frames beside the scan; the ones that were clicked come first."""
 ENLARGED = 4.0
 """How many times larger than to fit its box a frame is shown."""
-BOX_PX = 118
+BOX_PX = 150
+_PIN = '<img alt="" src="data:," style="display:none" onerror="gazelocLoupe.pin(this.parentNode)">'
 
 
 class LoupePanel:
@@ -45,14 +47,19 @@ class LoupePanel:
             return
         self._seen = seen
         boxes = [] if pair is None else self._boxes(state, pair)
-        content = f'<div class="gazeloc-loupe" style="display:flex;gap:6px">{"".join(boxes)}</div>' if boxes else ""
-        widgets.set_content(self._html, widgets.box(content) if content else "")
+        content = _PIN
+        if pair is not None and boxes:
+            names = f'data-key="{widgets.text(pair.key)}" data-name="{widgets.text(pair.name)}"'
+            content = f'<div class="gazeloc-loupe-boxes" hidden {names}>{"".join(boxes)}</div>{_PIN}'
+        widgets.set_content(self._html, f"<div>{content}</div>")
 
     def _boxes(self, state: AppState, pair: KeypointPair) -> list[str]:
         boxes = []
         if pair.scan is not None:
-            style = f"background:#222 url('{loupe_url(self._data, state, pair.scan)}') center/100% 100%"
-            boxes.append(_box(style, f"scan, {100 * ACROSS_M:.0f} cm across"))
+            at, start = loupe_places(self._data, state, pair.scan)
+            place = f'data-at="{at}" data-from="{start}"'
+            url = loupe_url(at, start, state.data_revision)
+            boxes.append(_box(url, (0.0, 0.0, BOX_PX, BOX_PX), place, f"scan, {100 * ACROSS_M:.0f} cm across"))
         camera = self._data.camera(state.recording)
         if camera is not None:
             marks = self._marks(state, pair)[: MOST_FRAMES + (pair.scan is None)]
@@ -66,7 +73,8 @@ class LoupePanel:
             return []
         alone = replace(state, annotation=replace(state.annotation, keypoints=KeypointSet((pair,))))
         found: list[tuple[int, Mark]] = []
-        for frame in _spread([int(frame) for frame in model.frame_indices if frame >= 0]):
+        clicked = {click.frame_index for click in pair.sightings}
+        for frame in sorted(clicked | set(_spread([int(frame) for frame in model.frame_indices if frame >= 0]))):
             marks, _ = marks_in_frame(self._data, alone, Side.SFM, frame)
             found += [(frame, mark) for mark in marks]
         middle = np.array([camera.width, camera.height]) / 2
@@ -78,8 +86,8 @@ class LoupePanel:
         url = f"/loupe/{quote(recording)}/{frame}.jpg?rev={self._revision}"
         wide, high = ENLARGED * BOX_PX, ENLARGED * BOX_PX * camera.height / camera.width
         left, top = BOX_PX / 2 - wide * mark.x_px / camera.width, BOX_PX / 2 - high * mark.y_px / camera.height
-        style = f"background:#222 url('{url}') {left:.1f}px {top:.1f}px/{wide:.1f}px {high:.1f}px no-repeat"
-        return _box(style, f"frame {frame}, {'clicked' if mark.is_clicked else 'expected'}")
+        caption = f"frame {frame}, {'clicked' if mark.is_clicked else 'expected'}"
+        return _box(url, (left, top, wide, high), f'data-frame="{frame}"', caption)
 
 
 def _spread(frames: list[int], most: int = 24) -> list[int]:
@@ -87,16 +95,18 @@ def _spread(frames: list[int], most: int = 24) -> list[int]:
     return frames[:: max(1, -(-len(frames) // most))]
 
 
-def _box(style: str, caption: str) -> str:
-    lines = "position:absolute;background:#ff00c8;mix-blend-mode:normal;opacity:.85"
-    cross = (
-        f'<i style="{lines};left:50%;top:30%;width:1px;height:15%"></i>'
-        f'<i style="{lines};left:50%;top:55%;width:1px;height:15%"></i>'
-        f'<i style="{lines};top:50%;left:30%;height:1px;width:15%"></i>'
-        f'<i style="{lines};top:50%;left:55%;height:1px;width:15%"></i>'
+def _box(url: str, picture: tuple[float, float, float, float], names: str, caption: str) -> str:
+    """A square that shows a part of a picture, whose left, top, width and height in it are given in pixels."""
+    left, top, wide, high = picture
+    background = f"#222 url('{url}') {left:.1f}px {top:.1f}px/{wide:.1f}px {high:.1f}px no-repeat"
+    cross = "".join(
+        f'<i style="{along}:{share}%;{across}:50%;{size}:15%;{thin}:1px"></i>'
+        for along, across, size, thin in (("top", "left", "height", "width"), ("left", "top", "width", "height"))
+        for share in (30, 55)
     )
+    numbers = " ".join(f"{value:.3f}" for value in picture)
     return (
-        f'<figure style="margin:0;width:{BOX_PX}px"><div style="position:relative;width:{BOX_PX}px;height:{BOX_PX}px;'
-        f'border-radius:4px;overflow:hidden;{style}">{cross}</div>'
-        f'<figcaption style="font-size:11px;opacity:.75">{widgets.text(caption)}</figcaption></figure>'
+        f'<figure><div class="gazeloc-loupe-box" {names} data-picture="{numbers}" '
+        f'style="width:{BOX_PX}px;height:{BOX_PX}px;background:{background}">{cross}</div>'
+        f"<figcaption>{widgets.text(caption)}</figcaption></figure>"
     )

@@ -19,6 +19,7 @@ class CameraTool(Tool):
 
     name = "goes to a camera's frame"
     hint = "Nothing is set by mistake. Shift-click sets a point all the same."
+    aims = False
 
     def click(self, click: Click) -> Action | None:
         """The camera under the click, drawn or not thinned out."""

@@ -94,6 +94,8 @@ class Tool:
 
     name: ClassVar[str]
     hint: ClassVar[str]
+    aims: ClassVar[bool] = True
+    """Whether a click means a spot, so that the page shows its lens at the pointer."""
 
     def __init__(self, bench: Bench):
         self.bench = bench
