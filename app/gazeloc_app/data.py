@@ -211,6 +211,14 @@ class ProjectData:
             return "Its tag has two possible poses." if bool(columns["is_ambiguous"][frame]) else ""
         return f"Rests on {used} tag{'s' if used > 1 else ''}; the worst is {100 * off_m:.1f} cm from its place."
 
+    def track_support(self, recording: str, frame: int) -> str:
+        """What a tracked frame's pose rests on, a sentence; "" where the largest piece has not tracked it."""
+        tracked = self.tracked(recording)
+        row = -1 if tracked is None else int(np.searchsorted(tracked.frame_indices, frame))
+        if tracked is None or row == len(tracked) or tracked.frame_indices[row] != frame:
+            return ""
+        return f"Rests on {tracked.points[row]} points of the keyframes around it, {tracked.error_px[row]:.1f} px off."
+
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
         """The ground truth: times and `scan_from_camera`."""
         entry = self._remember(f"{recording} entry", None, lambda: self.project.recording(recording))

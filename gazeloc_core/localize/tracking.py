@@ -66,6 +66,19 @@ class _Track:
     pixels: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What is kept of a frame's pose; of a long recording there are tens of thousands."""
+
+    pose: RigidTransform
+    points: int
+    error_px: float
+
+    @classmethod
+    def of(cls, found: FramePose) -> _Found:
+        return cls(found.world_from_camera, int(found.agrees.sum()), float(np.median(found.error_px[found.agrees])))
+
+
 _NO_TRACK = _Track(np.empty(0, dtype=np.int64), np.empty((0, 2)))
 
 
@@ -98,14 +111,14 @@ def track_frames(
     )
     tracker = _Tracker(model, recording.camera, recording.timestamp_ns, image_of, options)
     pictures = _Pictures(recording, todo, report)
-    found: dict[int, FramePose] = {}
+    found: dict[int, _Found] = {}
     refused: Counter[Refusal] = Counter()
     for stretch in todo:
         for frame, outcome in tracker.poses(stretch, pictures.of(stretch)):
             if isinstance(outcome, Refusal):
                 refused[outcome] += 1
             else:
-                found[frame] = outcome
+                found[frame] = _Found.of(outcome)
     report(1.0, f"tracked {len(found)} frames")
     return Tracking(_as_columns(found), sum(len(stretch.frames) for stretch in todo), dict(refused))
 
@@ -195,13 +208,13 @@ class _Pictures:
         return self._held
 
 
-def _as_columns(found: Mapping[int, FramePose]) -> TrackedFrames:
+def _as_columns(found: Mapping[int, _Found]) -> TrackedFrames:
     frames = sorted(found)
-    poses = [found[frame].world_from_camera for frame in frames]
+    rows = [found[frame] for frame in frames]
     return TrackedFrames(
         frame_indices=np.array(frames, dtype=np.int64),
-        centers=np.array([pose.translation for pose in poses]).reshape(-1, 3),
-        wxyz=np.array([wxyz_of(pose.rotation) for pose in poses]).reshape(-1, 4),
-        points=np.array([found[frame].agrees.sum() for frame in frames], dtype=np.int64),
-        error_px=np.array([np.median(found[frame].error_px[found[frame].agrees]) for frame in frames]),
+        centers=np.array([row.pose.translation for row in rows]).reshape(-1, 3),
+        wxyz=np.array([wxyz_of(row.pose.rotation) for row in rows]).reshape(-1, 4),
+        points=np.array([row.points for row in rows], dtype=np.int64),
+        error_px=np.array([row.error_px for row in rows], dtype=np.float64),
     )

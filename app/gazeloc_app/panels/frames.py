@@ -28,8 +28,8 @@ from gazeloc_core.trajectory import PoseStatus
 NOTHING = "nothing"
 STATUS_TEXT = {
     PoseStatus.REGISTERED.value: "registered",
-    PoseStatus.TRACKED.value: "tracked: measured from points of the keyframes around it",
-    PoseStatus.INTERPOLATED.value: "interpolated between frames around it: not measured",
+    PoseStatus.TRACKED.value: "tracked between keyframes",
+    PoseStatus.INTERPOLATED.value: "interpolated, not measured",
     PoseStatus.TAG_ONLY.value: "from a tag alone",
     PoseStatus.REJECTED.value: "rejected: no pose",
     PoseStatus.NONE.value: "not localised: no pose",
@@ -109,6 +109,8 @@ class FramePanel:
         seconds = (int(times[frame]) - int(times[0])) / 1e9
         facts = [f"Frame {frame} of {len(times)} · {seconds:.2f} s · {STATUS_TEXT[status]}"]
         facts.append(self._data.tag_support(state.recording, state.annotation.method, frame))
+        if status == PoseStatus.TRACKED.value:
+            facts.append(self._data.track_support(state.recording, frame))
         facts += [self._score_text(state, frame), self._error_text(state, frame), state.renderer_note]
         lines = [widgets.text(fact) for fact in facts if fact]
         mark = state.annotation.marks.get(frame)
