@@ -87,6 +87,10 @@ class Browser:
         self.looking.look(frame)
         self._controls.render(self._state())
 
+    def leave(self) -> None:
+        """Look at the room from outside again."""
+        self._controls.leave()
+
     def go_to(self, in_scan: Point) -> None:
         """Stand before a place of the scan and look at it."""
         self._controls.leave()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import viser
-from viser._messages import GuiSetPanelWidthMessage
+from viser._messages import GuiSetPanelCollapsedMessage, GuiSetPanelWidthMessage
 from viser.theme import TitlebarConfig, TitlebarImage
 
 from gazeloc_app.palette import BACKGROUND, BACKGROUND_DARK, Rgb, theme_color
@@ -22,6 +22,8 @@ _SETTLED_S = 10.0
 NARROW_PX = 320
 """A view of the room that is narrower than this, on a page that has just been opened, asks for narrower panels."""
 TABLET_PANEL_PX = 320
+UPRIGHT_PX = 150
+"""Narrower still, as on a tablet that is held upright: the panels at the side begin folded up (the room keeps 120)."""
 _LOGO = TitlebarImage(
     image_url_light="/static/logo-light.svg", image_url_dark="/static/logo-dark.svg", image_alt="GazeLoc", href=None
 )
@@ -56,8 +58,20 @@ def set_panel_width(client: viser.ClientHandle, panel: Any, width_px: float) -> 
     gui._websock_interface.queue_message(message)
 
 
+def fold_panel(client: viser.ClientHandle, panel: Any) -> None:
+    """Fold a panel up in one browser, as its own button does."""
+    gui = client.gui
+    message = GuiSetPanelCollapsedMessage(
+        panel._placement_uuid, True, counter=gui._next_layout_counter(), run_id=gui._layout_run_id
+    )
+    gui._websock_interface.queue_message(message)
+
+
 class Look:
-    """The look of one connected browser; on a tablet its panels are narrower, so that something of the room is left."""
+    """The look of one connected browser; on a tablet its panels are narrower, so that something of the room is left.
+
+    The first of `panels` is the main one; the others are folded up where there is no room for both.
+    """
 
     def __init__(self, client: viser.ClientHandle, panels: Sequence[Any]):
         self._client, self._panels = client, panels
@@ -89,8 +103,11 @@ class Look:
         """Once, while the page still settles: later on its widths are the person's."""
         if time.monotonic() < self._until and camera.image_width < NARROW_PX:
             self._until = 0.0
+            is_upright = camera.image_width < UPRIGHT_PX
             for panel in self._panels:
                 set_panel_width(self._client, panel, TABLET_PANEL_PX)
+            for panel in self._panels[1:] if is_upright else ():
+                fold_panel(self._client, panel)
 
     async def _toggled(self, _event: object) -> None:
         self.toggle()

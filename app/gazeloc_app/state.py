@@ -33,6 +33,7 @@ class Layer(StrEnum):
     GAZE = "Gaze"
     ERRORS = "Errors"
     GRID = "Grid"
+    PEOPLE = "People"
 
 
 class Coloring(StrEnum):

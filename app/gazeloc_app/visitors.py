@@ -12,8 +12,6 @@ import re
 import secrets
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
 
 import viser
 
@@ -23,9 +21,12 @@ from gazeloc_app.actions.jobs import CancelJob
 from gazeloc_app.actions.people import PersonCame, PersonLeft
 from gazeloc_app.browser import Browser
 from gazeloc_app.panels.people import PeopleBar
+from gazeloc_app.presence import Presence
 from gazeloc_app.routes import Asked, Reply, Routes
-from gazeloc_app.state import AppState
-from gazeloc_app.view_memory import View, ViewMemory, vector
+from gazeloc_app.scene.people import PeopleLayer
+from gazeloc_app.state import AppState, Person
+from gazeloc_app.view_memory import ViewMemory
+from gazeloc_app.visit import Visit
 from gazeloc_core.errors import InputError
 
 _SAVE_EVERY_S = 1.0
@@ -36,28 +37,21 @@ _HELLO = (
 )
 
 
-@dataclass
-class _Visit:
-    """One connection; `tab` is the page's own id, known once it said hello."""
-
-    client: viser.ClientHandle
-    browser: Browser
-    people: PeopleBar
-    tab: str | None = None
-
-
 class Visitors:
     """All connections of one app."""
 
     def __init__(self, memory: ViewMemory, dispatch: Callable[[Action], None]):
         self._memory, self._dispatch = memory, dispatch
-        self._visits: dict[str, _Visit] = {}
+        self._visits: dict[str, Visit] = {}
         self._start = secrets.token_hex(8)
         """Tells this run of the app from the one before, whose page may have other scripts."""
+        self._people: tuple[Person, ...] = ()
+        self._presence = Presence(lambda: list(self._visits.values()))
         self._ended = threading.Event()
-        self._asks: dict[str, Callable[[_Visit, Mapping[str, str]], None]] = {
+        self._asks: dict[str, Callable[[Visit, Mapping[str, str]], None]] = {
             "hello": self._hello,
             "name": self._name,
+            "go-to-person": self._go_to_person,
             "cancel-job": lambda _, query: self._dispatch(CancelJob(_number(query, "number"))),
             "frame-click": lambda visit, query: visit.browser.hand.click_in_frame(query),
             "loupe-click": lambda visit, query: visit.browser.hand.click_in_loupe(query),
@@ -65,20 +59,22 @@ class Visitors:
         }
 
     def start(self) -> None:
-        """Save the views now and then, on a thread of its own, until `stop()`."""
+        """Save the views now and then, and show where people look from, on threads of their own until `stop()`."""
+        self._presence.start()
         threading.Thread(target=self._save_now_and_then, name="gazeloc-views", daemon=True).start()
 
     def stop(self) -> None:
-        """End the thread and save the views."""
+        """End the threads and save the views."""
+        self._presence.stop()
         self._ended.set()
         self.remember()
 
     def come(self, client: viser.ClientHandle, browser: Browser, state: AppState) -> None:
         """A page has connected."""
         secret = secrets.token_urlsafe(24)
-        visit = _Visit(client, browser, PeopleBar(client.gui, client.client_id))
-        visit.people.render(state)
-        self._visits[secret] = visit
+        people, onlookers = PeopleBar(client.gui, client.client_id), PeopleLayer(client.scene)
+        self._visits[secret] = Visit(client, browser, people, onlookers)
+        people.render(state.people, {})
         self._dispatch(PersonCame(client.client_id))
         client.gui.add_html(_HELLO.format(secret=secret, start=self._start))
 
@@ -92,8 +88,8 @@ class Visitors:
 
     def render(self, state: AppState) -> None:
         """Show everybody who is here."""
-        for visit in list(self._visits.values()):
-            visit.people.render(state)
+        self._people = state.people
+        self._presence.render(state)
 
     def remember(self) -> None:
         """Remember all views, on the disk too."""
@@ -115,7 +111,7 @@ class Visitors:
 
         routes.get("/session/{secret}/{what}", answer)
 
-    def _hello(self, visit: _Visit, query: Mapping[str, str]) -> None:
+    def _hello(self, visit: Visit, query: Mapping[str, str]) -> None:
         tab = query.get("tab", "")
         if not _BROWSER_ID.fullmatch(tab):
             raise InputError("A page's id is letters and digits.")
@@ -126,44 +122,29 @@ class Visitors:
         view = self._memory.get(tab)
         visit.tab = tab
         if view is not None:
-            _restore(visit, view)
+            visit.come_back(view)
         self._name(visit, query)
 
-    def _name(self, visit: _Visit, query: Mapping[str, str]) -> None:
+    def _name(self, visit: Visit, query: Mapping[str, str]) -> None:
         self._dispatch(PersonCame(visit.client.client_id, query.get("name", "")[:200]))
 
-    def _remember(self, visit: _Visit) -> None:
+    def _go_to_person(self, visit: Visit, query: Mapping[str, str]) -> None:
+        number = _number(query, "number")
+        client_id = next((person.client_id for person in self._people if person.number == number), None)
+        other = next((one for one in self._visits.values() if one.client.client_id == client_id), None)
+        view = None if other is None else other.view
+        if view is not None:  # they may just have gone
+            visit.go_to(view)
+
+    def _remember(self, visit: Visit) -> None:
         if visit.tab is not None:
-            view = _view_of(visit)
+            view = visit.view
             if view is not None:
                 self._memory.put(visit.tab, view)
 
     def _save_now_and_then(self) -> None:
         while not self._ended.wait(_SAVE_EVERY_S):
             self.remember()
-
-
-def _view_of(visit: _Visit) -> View | None:
-    camera, target = visit.client.camera, visit.browser.looking.target
-    try:
-        position, look_at, up = vector(camera.position), vector(camera.look_at), vector(camera.up_direction)
-        fov = float(camera.fov)
-    except (AssertionError, ValueError):  # the page has not said yet, or nonsense
-        return None
-    recording, frame = (None, None) if target is None else (target.recording, target.frame)
-    return View(position, look_at, up, fov, visit.browser.tool.name, recording, frame)
-
-
-def _restore(visit: _Visit, view: View) -> None:
-    camera: Any = visit.client.camera
-    with visit.client.atomic():
-        camera.up_direction = view.up
-        camera.position = view.position
-        camera.look_at = view.look_at
-        camera.fov = view.fov_rad
-    visit.browser.take_again(view.tool)
-    if view.frame is not None:
-        visit.browser.look_again(view.recording, view.frame)
 
 
 def _number(query: Mapping[str, str], name: str) -> int:

@@ -1,19 +1,29 @@
 """What the app says about itself: hints on everything that can be pressed, keys, first steps, light and dark."""
 
 import asyncio
+import gc
+import re
+import shutil
+import time
+from dataclasses import replace
 from unittest.mock import MagicMock
 
 import pytest
 from app_project import make_app_project
 from app_steps import step, stop
 from gazeloc_app import looks
+from gazeloc_app.actions.history import Undo
+from gazeloc_app.actions.jobs import CancelJob, JobEnded, StartJob
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
+from gazeloc_app.data import ProjectData
 from gazeloc_app.looks import Look
 from gazeloc_app.panels.first_steps import FirstSteps
 from gazeloc_app.panels.help import WORDS, HelpPanel, commands_of
-from viser import ViserServer
-from viser._messages import GuiSetPanelWidthMessage
+from gazeloc_app.state import AppState, Level
+from gazeloc_app.work import tasks
+from viser import GuiHtmlHandle, ViserServer
+from viser._messages import GuiSetPanelCollapsedMessage, GuiSetPanelWidthMessage
 from visitor import CAMERA, get, page, until
 
 
@@ -51,6 +61,25 @@ def test_everything_that_can_be_pressed_or_set_says_what_it_does(app):
 
 def test_so_does_what_belongs_to_one_browser(app):
     assert while_connected(app, lambda client: without_hint(client.gui)) == []
+
+
+def test_so_does_what_is_in_our_own_html(app, monkeypatch):
+    monkeypatch.setattr(app.jobs, "start", lambda *_, **__: None)
+    walk = (("recording", "walk"),)
+    jobs = (StartJob("Align", tasks.align, walk), StartJob("Draw the figures", tasks.draw_figures, walk))
+    step(app, *jobs, PickPoint(Side.SCAN, (1, 2, 0.5)))
+
+    def look(client):
+        while client.client_id not in [person.client_id for person in app.store.state.people]:
+            time.sleep(0.02)
+            app.store.step()
+        return [handle.content for handle in gc.get_objects() if isinstance(handle, GuiHtmlHandle)]
+
+    found = re.findall(r"<(?:button|input|select)\b[^>]*>", "".join(while_connected(app, look)))
+    kinds = ("gazeloc-step", "gazeloc-small", "Your name")
+    assert [kind for kind in kinds if not any(kind in tag for tag in found)] == []
+    assert [tag for tag in found if not re.search(r'(title|aria-label)="[^"]+"', tag)] == []
+    step(app, *(CancelJob(number) for number in (1, 2)), JobEnded(Level.INFO, "done"), Undo())
 
 
 def test_every_command_is_in_the_help_with_its_key(app):
@@ -92,6 +121,39 @@ def test_the_first_steps_say_what_comes_next(app):
     assert "1 of 3 keypoints" in card().content
 
 
+class TestTheFirstStepFitsTheProject:
+    """One empty project of each kind: what its card says to do first."""
+
+    def card(self, project):
+        panel = FirstSteps(MagicMock(), ProjectData(project))
+        panel.render(AppState(("walk",), "walk"))
+        return panel._card.content
+
+    def without_stages(self, project, **changes):
+        shutil.rmtree(project.folder / "recordings")
+        project.save(replace(project.settings, **changes))
+        return project
+
+    def test_nothing_was_run(self, tmp_path):
+        card = self.card(self.without_stages(make_app_project(tmp_path)))
+        assert "Process.</b> Press “Run everything” below: it finds the cameras from the frames" in card
+
+    def test_with_a_model_of_colmap(self, tmp_path):
+        project = make_app_project(tmp_path)
+        walk = replace(project.recording("walk"), colmap=tmp_path)
+        assert "takes the cameras of your COLMAP model" in self.card(
+            self.without_stages(project, recordings={"walk": walk})
+        )
+
+    def test_without_tags(self, tmp_path):
+        card = self.card(make_app_project(tmp_path, tags=False))
+        assert "Align.</b> This project names no tags: set three keypoints" in card
+
+    def test_with_a_bare_mesh(self, tmp_path):
+        card = self.card(make_app_project(tmp_path))
+        assert "Align.</b> The scan has no pictures of a phone, so no tag is known on it: set three keypoints" in card
+
+
 def test_the_logo_and_the_icon_are_there(app):
     for name in ("logo-light.svg", "logo-dark.svg", "favicon.svg"):
         status, headers, body = get(app.server.get_port(), f"/static/{name}")
@@ -127,9 +189,10 @@ def test_the_dark_is_remembered_by_the_browser():
     client.local_storage.set_item.assert_called_with("gazeloc-look", "light")
 
 
-@pytest.mark.parametrize(("width_px", "panels"), [(190, 2), (450, 0)])
-def test_a_tablets_panels_are_narrower_once(app, monkeypatch, width_px, panels):
-    set_to = []
+@pytest.mark.parametrize(("width_px", "panels", "folds"), [(120, 2, 1), (190, 2, 0), (450, 0, 0)])
+def test_a_tablets_panels_are_narrower_once_and_upright_one_is_folded_up(app, monkeypatch, width_px, panels, folds):
+    set_to, folded = [], []
+    monkeypatch.setattr(looks, "fold_panel", lambda client, panel: folded.append(panel))
     monkeypatch.setattr(looks, "set_panel_width", lambda client, panel, width: set_to.append((panel, width)))
 
     async def talk():
@@ -144,6 +207,7 @@ def test_a_tablets_panels_are_narrower_once(app, monkeypatch, width_px, panels):
 
     asyncio.run(talk())
     assert [width for _, width in set_to] == [looks.TABLET_PANEL_PX] * panels
+    assert folded == [app.panels.handles[1]] * folds
 
 
 def test_viser_takes_a_panels_width_for_one_browser(app):
@@ -151,7 +215,10 @@ def test_viser_takes_a_panels_width_for_one_browser(app):
         sent = []
         client.gui._websock_interface.queue_message = sent.append
         looks.set_panel_width(client, app.server.gui.main_panel, 300)
-        return [one for one in sent if isinstance(one, GuiSetPanelWidthMessage)]  # others may be under way
+        looks.fold_panel(client, app.panels.handles[1])
+        kinds = (GuiSetPanelWidthMessage, GuiSetPanelCollapsedMessage)
+        return [one for one in sent if isinstance(one, kinds)]  # others may be under way
 
-    (message,) = while_connected(app, look)
+    message, fold = while_connected(app, look)
+    assert (fold.collapsed, fold.uuid) == (True, app.panels.handles[1]._placement_uuid)
     assert (message.width, message.uuid) == (300, app.server.gui.main_panel._placement_uuid)

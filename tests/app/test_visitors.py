@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import html
 import re
+import time
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -15,16 +16,35 @@ from gazeloc_app.actions.history import GoToStep, Undo
 from gazeloc_app.actions.jobs import CancelJob
 from gazeloc_app.actions.people import MAX_NAME, PersonCame, PersonLeft
 from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.actions.views import ShowLayer
 from gazeloc_app.frames.looking import Target
 from gazeloc_app.panels.history import MAX_SHOWN, HistoryPanel
-from gazeloc_app.panels.people import PeopleBar
+from gazeloc_app.panels.people import COLORS, PeopleBar
 from gazeloc_app.routes import Routes
-from gazeloc_app.state import AppState
+from gazeloc_app.state import AppState, Layer
 from gazeloc_app.view_memory import MAX_BROWSERS, View, ViewMemory
 from gazeloc_app.visitors import Visitors
 
 TAB, OTHER = "a" * 24, "b" * 24
 VIEW = View((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.9, "orbits")
+
+
+class Scene:
+    """The scene of one page: what is in it, by name, and how much was sent."""
+
+    def __init__(self):
+        self.nodes, self.made = {}, 0
+
+    def _add(self, name, **values):
+        self.made += 1
+        self.nodes[name] = SimpleNamespace(**values, remove=lambda: self.nodes.pop(name))
+        return self.nodes[name]
+
+    def add_camera_frustum(self, name, **values):
+        return self._add(name, **values)
+
+    def add_label(self, name, text, **values):
+        return self._add(name, text=text, **values)
 
 
 class Client:
@@ -33,10 +53,17 @@ class Client:
     def __init__(self, number: int):
         self.client_id = number
         self.camera = SimpleNamespace(
-            position=np.zeros(3), look_at=np.ones(3), up_direction=np.array([0.0, 0, 1]), fov=1.0
+            position=np.zeros(3),
+            look_at=np.ones(3),
+            up_direction=np.array([0.0, 0, 1]),
+            fov=1.0,
+            wxyz=np.array([1.0, 0, 0, 0]),
+            image_width=800,
+            image_height=600,
         )
+        self.scene = Scene()
         self.gui = MagicMock()
-        self.gui.add_html.side_effect = lambda content, **_: SimpleNamespace(content=content)
+        self.gui.add_html.side_effect = lambda content, **_: SimpleNamespace(content=content, visible=True)
         self.atomic = MagicMock()
 
     @property
@@ -64,6 +91,7 @@ class Place:
     def dispatch(self, action):
         self.actions.append(action)
         self.state = action.apply(self.state)
+        self.visitors.render(self.state)
 
     def come(self, tab=None, name=""):
         self.number += 1
@@ -72,6 +100,13 @@ class Place:
         if tab is not None:
             assert self.ask(client.secret, f"hello?tab={tab}&name={name}") == (200, "here")
         return client, one
+
+    @property
+    def visits(self):
+        return {visit.client.client_id: visit for visit in self.visitors._visits.values()}
+
+    def bar(self, client):
+        return self.visits[client.client_id].people
 
     def ask(self, secret, what):
         reply = asyncio.run(self.routes.answer(f"/session/{secret}/{what}"))
@@ -151,10 +186,126 @@ def test_each_page_shows_itself_as_a_field_and_others_as_text_and_names_are_esca
         state = action.apply(state)
     client = Client(1)
     bar = PeopleBar(client.gui, 2)
-    bar.render(state)
-    assert "<script>" not in bar._html.content
-    assert html.escape('"><script>') in bar._html.content
-    assert 'value="Bo"' in bar._html.content
+    bar.render(state.people, {1: "<i>a tool"})
+    assert "<script>" not in bar._others.content
+    assert html.escape('"><script>') in bar._others.content
+    assert html.escape("<i>a tool") in bar._others.content
+    assert 'value="Bo"' in bar._own.content
+
+
+def test_typing_a_name_is_not_disturbed_by_what_the_others_do():
+    state = PersonCame(2, "Bo").apply(AppState(("walk",), "walk"))
+    bar = PeopleBar(Client(1).gui, 2)
+    bar.render(state.people, {})
+    before = bar._own.content
+    assert not bar._others.visible
+    bar.render(PersonCame(1, "Anna").apply(state).people, {1: "measures a distance"})
+    assert bar._own.content == before
+    assert bar._others.visible
+
+
+def test_only_so_many_others_are_listed():
+    state = AppState(("walk",), "walk")
+    for number in range(30):
+        state = PersonCame(number).apply(state)
+    bar = PeopleBar(Client(1).gui, 0)
+    bar.render(state.people, {})
+    assert bar._others.content.count("<button") == 12
+    assert "and 17 more" in bar._others.content
+
+
+class TestOthersInTheScene:
+    @pytest.fixture
+    def two(self, place):
+        (first, _), (second, one) = place.come(TAB, "Anna"), place.come(OTHER, "<b>Bo")
+        second.camera.position, one.tool.name = np.array([3.0, 2, 1]), "measures a distance"
+        place.visitors.render(place.state)
+        return first, second
+
+    def test_each_page_sees_where_the_other_looks_from_and_what_they_hold(self, place, two):
+        first, second = two
+        frustum, label = (first.scene.nodes[name] for name in ("/people/2", "/people-names/2"))
+        assert tuple(frustum.position) == tuple(label.position) == (3, 2, 1)
+        assert (label.text, frustum.fov) == ("<b>Bo", 1.0)
+        assert frustum.color == COLORS[1]
+        assert set(second.scene.nodes) == {"/people/1", "/people-names/1"}
+        assert "measures a distance" in place.bar(first)._others.content
+
+    def test_a_camera_that_moves_is_moved_and_not_made_anew(self, place, two):
+        first, second = two
+        made = first.scene.made
+        second.camera.position, second.camera.wxyz = np.array([3.0, 2, 2]), np.array([0.0, 1, 0, 0])
+        place.visitors._presence.show()
+        frustum = first.scene.nodes["/people/2"]
+        assert tuple(frustum.position) == (3, 2, 2)
+        assert tuple(frustum.wxyz) == (0, 1, 0, 0)
+        assert first.scene.made == made
+
+    def test_who_stands_where_one_does_oneself_is_not_drawn_around_ones_eye(self, place, two):
+        first, second = two
+        second.camera.position = first.camera.position + 0.1
+        place.visitors._presence.show()
+        assert first.scene.nodes == {}
+
+    @pytest.mark.parametrize(
+        ("field", "value"),
+        [
+            ("position", np.array([np.nan, 0, 0])),
+            ("wxyz", np.array([np.inf, 0, 0, 0])),
+            ("wxyz", np.zeros(4)),
+            ("wxyz", np.zeros(3)),
+            ("image_height", np.nan),
+        ],
+    )
+    def test_a_camera_that_is_nonsense_is_not_drawn(self, place, two, field, value):
+        first, second = two
+        setattr(second.camera, field, value)
+        place.visitors._presence.show()
+        assert first.scene.nodes == {}
+        assert "/people/1" in second.scene.nodes or field == "position"
+
+    def test_the_layer_hides_them_and_who_has_gone_is_gone(self, place, two):
+        first, second = two
+        place.dispatch(ShowLayer(Layer.PEOPLE, False))
+        assert first.scene.nodes == {}
+        place.dispatch(ShowLayer(Layer.PEOPLE, True))
+        assert "/people/2" in first.scene.nodes
+        place.visitors.go(second)
+        assert first.scene.nodes == {}
+
+    def test_a_click_on_a_name_goes_to_what_they_see_and_keeps_the_tool(self, place, two):
+        first, second = two
+        second.camera.fov = 0.6
+        place.visits[2].browser.looking.target = Target("walk", 4)
+        assert place.ask(first.secret, "go-to-person?number=2") == (200, "here")
+        assert tuple(first.camera.position) == (3, 2, 1)
+        assert first.camera.fov == 0.6
+        own = place.visits[1].browser
+        own.leave.assert_called_once_with()
+        own.look_again.assert_called_once_with("walk", 4)
+        own.take_again.assert_not_called()
+        assert place.ask(first.secret, "go-to-person?number=7") == (200, "here")  # just gone
+        assert tuple(first.camera.position) == (3, 2, 1)
+
+    def test_the_thread_follows_cameras_and_sleeps_while_one_is_alone(self, place, two):
+        first, second = two
+        place.visitors._presence.start()
+        second.camera.position = np.array([9.0, 9, 9])
+        until_so(lambda: tuple(first.scene.nodes["/people/2"].position) == (9, 9, 9))
+        place.visitors.go(second)
+        time.sleep(0.5)
+        looks = []
+        place.visitors._presence.show = lambda: looks.append(1)
+        time.sleep(0.6)
+        assert len(looks) <= 1
+        place.visitors._presence.stop()
+
+
+def until_so(is_so, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.02)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +326,16 @@ def test_a_page_asks_with_its_secret_and_nobody_without(place, what, action):
 
 
 @pytest.mark.parametrize(
-    "what", ["cancel-job", "cancel-job?number=-1", "go-to-step?step=x&count=1", "hello?tab=../x", "delete-all", "hello"]
+    "what",
+    [
+        "cancel-job",
+        "cancel-job?number=-1",
+        "go-to-person?number=x",
+        "go-to-step?step=x&count=1",
+        "hello?tab=../x",
+        "delete-all",
+        "hello",
+    ],
 )
 def test_what_a_page_makes_up_is_refused(place, what):
     client, _ = place.come(TAB)

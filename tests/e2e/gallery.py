@@ -1,7 +1,7 @@
 """Pictures of every panel in every look, to be looked at: python tests/e2e/gallery.py PROJECT OUT
 
-A picture per tab of a finished project at 1280x800 in light and dark, and on a tablet's 1024x768; then of the same
-project before anything was run, where panels say what to do first. The project is copied and left as it was.
+A picture per tab of a finished project at 1280x800 in light and dark, and on a tablet, flat and upright; then of the
+same project before anything was run, where panels say what to do first. The project is copied and left as it was.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from playwright.sync_api import Browser, sync_playwright  # noqa: E402
 
 from gazeloc_core.project import Project  # noqa: E402
 
-LOOKS = {"light": (1280, 800), "dark": (1280, 800), "tablet": (1024, 768)}
+LOOKS = {"light": (1280, 800), "dark": (1280, 800), "tablet": (1024, 768), "upright": (768, 1024)}
 
 
 def main(folder: Path, out: Path, only: tuple[str, ...]) -> None:
-    """Take all pictures, or only of the named looks ("light", "dark", "tablet", "empty")."""
+    """Take all pictures, or only of the named looks (of LOOKS, and "empty")."""
     out.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as work:
         browser = launch(playwright, chromium_path() or "chromium")
@@ -67,7 +67,7 @@ def _shoot_tabs(browser: Browser, app: App, size: tuple[int, int], out: Path, lo
     if look == "dark":
         view.tab("Help").press("Light or dark")
     page.wait_for_timeout(3000)
-    for tab in page.get_by_role("tab").all_inner_texts():
+    for tab in page.get_by_role("tab").locator("visible=true").all_inner_texts():
         view.tab(tab)
         page.wait_for_timeout(800)
         page.screenshot(path=str(out / f"{look}-{tab.strip().lower()}.png"))

@@ -142,7 +142,10 @@ def work(pipe: Connection, sources: Sources) -> None:
         except Exception as error:
             _log.exception("drawing failed")
             answer = (False, RenderError(f"Drawing failed: {type(error).__name__}: {error}."))
-        pipe.send(answer)
+        try:
+            pipe.send(answer)
+        except OSError:  # the app is gone
+            return
 
 
 class _Studio:

@@ -17,7 +17,9 @@ from gazeloc_app.work import tasks
 from gazeloc_app.work.jobs import Task
 
 NONE = "(not drawn yet)"
-NONE_YET = widgets.card("No figure yet.", "Run everything first: the figures are drawn from the tags that were found.")
+NONE_YET = widgets.card(
+    "No figure yet.", "Press “Draw the figures”; they are drawn from the tags that “Run everything” found."
+)
 
 
 class FigurePanel:

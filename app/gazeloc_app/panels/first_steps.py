@@ -11,6 +11,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState
 
 ENOUGH_PAIRS = 3
+_CLICK = "set three keypoints, each on the scan and in the reconstruction (tab Keypoints); then Align."
 
 
 class Step(NamedTuple):
@@ -41,11 +42,11 @@ class FirstSteps:
         pairs = sum(pair.enabled for pair in annotation.keypoints)
         has_alignment = self._data.alignment(recording, annotation.alignment) is not None
         has_poses = self._data.trajectory(recording, self._data.poses_key(recording, annotation)) is not None
-        align = "Tags seen by both sides align it by themselves. Without them: set three keypoints, then Align."
+        align = self._how_to_align()
         if pairs and pairs < ENOUGH_PAIRS and not has_alignment:
             align = f"{pairs} of {ENOUGH_PAIRS} keypoints are there, then press Align in the tab Align."
         return (
-            Step(is_reconstructed, "Process", "Press “Run everything” below. It goes on where it was stopped."),
+            Step(is_reconstructed, "Process", self._how_to_process(recording)),
             Step(has_alignment, "Align", align),
             Step(has_poses, "Pose", "“Run everything” puts every frame and its gaze into the scan."),
             Step(
@@ -54,6 +55,19 @@ class FirstSteps:
                 "Compare frames with renders on the left; mark good and bad.",
             ),
         )
+
+    def _how_to_process(self, recording: str) -> str:
+        has_model = self._data.project.recording(recording).colmap is not None
+        source = "takes the cameras of your COLMAP model" if has_model else "finds the cameras from the frames"
+        return f"Press “Run everything” below: it {source}, and goes on where it was stopped."
+
+    def _how_to_align(self) -> str:
+        """Tags do it where both sides can see any; else people have to click, and are told why."""
+        if self._data.project.settings.tags is None:
+            return f"This project names no tags: {_CLICK}"
+        if not self._data.scan().frames_with_images:
+            return f"The scan has no pictures of a phone, so no tag is known on it: {_CLICK}"
+        return f"Tags seen by both sides align it by themselves. Without them: {_CLICK}"
 
 
 def _card_html(steps: tuple[Step, ...]) -> str:

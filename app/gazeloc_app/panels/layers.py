@@ -26,6 +26,7 @@ HINTS = {
     Layer.TAG_POINTS: "The reconstruction's points under tags; those that the paper's filter drops are grey.",
     Layer.ERRORS: "Lines from the estimated cameras to the true ones, coloured by their length.",
     Layer.GRID: "Squares of one metre on the floor, and the scan's axes; an arrow marks the one that is up.",
+    Layer.PEOPLE: "Where the others who are here look from, in their colours.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
 _SAME_STROKE_S = 1.5
