@@ -17,6 +17,7 @@ from gazeloc_app.drawing.facing import place_to_stand
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.frames.looking import Looking
 from gazeloc_app.hand import Hand, Reach
+from gazeloc_app.kept import Kept
 from gazeloc_app.keypoints.picking import ClickFilter
 from gazeloc_app.panels.looking import LookingControls
 from gazeloc_app.panels.nudging import add_nudges
@@ -51,7 +52,7 @@ class Browser:
         self.looking = Looking(client, data, render, state, dispatch)
         self._add_widgets()
         self._controls = LookingControls(client, data, self.looking, state, dispatch)
-        cut = Cut(client, *room_corners(data.scan().mesh), data.scan().up_axis)
+        self._cut = cut = Cut(client, *room_corners(data.scan().mesh), data.scan().up_axis)
         moves = lambda: bool(self._move.value)  # noqa: E731
         snaps = lambda: bool(self._snap.value)  # noqa: E731
         bench = Bench(client, data, self.looking, state, dispatch, lambda: view.front, moves, cut, snaps)
@@ -67,6 +68,11 @@ class Browser:
     def tool(self) -> Tool:
         """The tool in hand; a value that the page made up counts as the first."""
         return self._tools.get(str(self._choice.value)) or next(iter(self._tools.values()))
+
+    @property
+    def kept(self) -> Kept:
+        """What this browser's cuts leave of the room."""
+        return self._cut.kept
 
     def click(self, click: Click, *, is_shifted: bool = False) -> None:
         """Act on a click."""

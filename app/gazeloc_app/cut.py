@@ -1,13 +1,12 @@
-"""Cutting the scan open, for one browser: what lies beyond the sliders is neither drawn nor clicked.
+"""Cutting the room open, for one browser: what lies beyond the sliders is neither drawn nor clicked nor dragged.
 
 Each cutting plane is an invisible node `/cut/<n>` of that browser's scene, whose z axis points to what is cut away;
-static/page/cut.js gives them to the scan's material.
+static/page/cut.js applies them to everything that stands in the room.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,21 +14,10 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from gazeloc_app import widgets
+from gazeloc_app.kept import EVERYTHING, Kept, Plane
 from gazeloc_app.scene.placing import NodeGroup
 from gazeloc_core.arrays import Floats
 from gazeloc_core.viewpoint import up_vector
-
-
-@dataclass(frozen=True)
-class Plane:
-    """What is cut away: all points with `normal` · point > `offset`, in the frame `scan`, metres."""
-
-    normal: tuple[float, float, float]
-    offset: float
-
-    def contains(self, point_in_scan: Floats) -> bool:
-        """Whether a point (3,) is left."""
-        return bool(np.dot(self.normal, point_in_scan) <= self.offset)
 
 
 class Cut:
@@ -37,13 +25,13 @@ class Cut:
 
     def __init__(self, client: viser.ClientHandle, low: Floats, high: Floats, up_axis: str):
         """`low` and `high` (3,) are the room's corners in the frame `scan`."""
-        self.planes: tuple[Plane, ...] = ()
+        self.kept = EVERYTHING
         self._client = client
         self._nodes: NodeGroup[Plane] = NodeGroup(self._make_node)
         up = up_vector(up_axis)
         self._axes = [up, *(np.eye(3)[axis] for axis in range(3) if up[axis] == 0)]
         self._sliders: list[Any] = []
-        with client.gui.add_folder("Cut the scan open", expand_by_default=False):
+        with client.gui.add_folder("Cut the room open", expand_by_default=False):
             for axis, label in zip(self._axes, _labels(up_axis), strict=True):
                 ends = sorted((float(axis @ low), float(axis @ high)))
                 size = round(max(ends[1] - ends[0], 0.02), 2)
@@ -57,18 +45,15 @@ class Cut:
             )
         widgets.on_user(self._whole, lambda _: self._undo(), event="on_click")
 
-    def leaves(self, point_in_scan: Floats) -> bool:
-        """Whether a point (3,) of the scan is not cut away."""
-        return all(plane.contains(point_in_scan) for plane in self.planes)
-
     def _changed(self) -> None:
-        self.planes = tuple(
+        planes = tuple(
             plane
             for axis, (slider, start, size) in zip(self._axes, self._sliders, strict=True)
             for plane in _planes(axis, slider.value, start, size)
         )
-        self._nodes.show({f"/cut/{number}": plane for number, plane in enumerate(self.planes)})
-        widgets.set_property(self._whole, "visible", bool(self.planes))
+        self.kept = Kept(planes)
+        self._nodes.show({f"/cut/{number}": plane for number, plane in enumerate(planes)})
+        widgets.set_property(self._whole, "visible", bool(planes))
 
     def _undo(self) -> None:
         for slider, _, size in self._sliders:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_core.arrays import Floats
 from gazeloc_core.keypoints import Point
@@ -55,12 +56,12 @@ def _in_scan(nudge: Nudge, camera_wxyz: Floats) -> Floats:
     return np.asarray(nudge.screen[0] * right + nudge.screen[1] * down)
 
 
-def dragged(raycaster: Raycaster, eye: Floats, pointer: Floats, front: int) -> Point | None:
+def dragged(raycaster: Raycaster, eye: Floats, pointer: Floats, front: int, kept: Kept = EVERYTHING) -> Point | None:
     """Where on the surface a marker is that was dragged to the pointer, a place in the view; None beside the scan."""
     ray = np.asarray(pointer, dtype=np.float64) - np.asarray(eye, dtype=np.float64)
     if not np.isfinite(ray).all() or np.linalg.norm(ray) < 1e-9:
         return None
-    found = pick_mesh(raycaster, eye, ray, front)
+    found = pick_mesh(raycaster, eye, ray, front, kept)
     if found is None:
         return None
     x, y, z = found.tolist()

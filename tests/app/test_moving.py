@@ -9,6 +9,7 @@ import pytest
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.picks import MovePoint, PickPoint, Side
 from gazeloc_app.dragging import Cloud, Dragging
+from gazeloc_app.kept import EVERYTHING, Kept, Plane
 from gazeloc_app.keypoints.snapping import snap
 from gazeloc_app.moving import ARROWS, Nudge, dragged, nudged, nudged_in_view
 from gazeloc_app.state import AppState, Level
@@ -59,7 +60,7 @@ def test_a_drag_ends_on_the_surface_under_the_pointer():
     assert dragged(wall(), EYE, EYE, 0) is None
 
 
-def drag(state, *pointers, side=Side.SCAN, cloud=None):
+def drag(state, *pointers, side=Side.SCAN, cloud=None, kept=EVERYTHING):
     """The state after a drag of k1's marker over these pointers, and where the marker went."""
     box = SimpleNamespace(state=state)
 
@@ -67,10 +68,10 @@ def drag(state, *pointers, side=Side.SCAN, cloud=None):
         box.state = action.apply(box.state)
 
     data = SimpleNamespace(raycaster=wall)
-    dragging = Dragging(data, lambda: 0, dispatch)
+    dragging = Dragging(data, lambda: 0, dispatch, {5: kept}.get)
     dragging.cloud = cloud
     marker = SimpleNamespace(position=np.array(side.point_of(state.annotation.keypoints.pairs[0])))
-    client = SimpleNamespace(camera=SimpleNamespace(position=EYE, fov=0.8, image_height=800))
+    client = SimpleNamespace(client_id=5, camera=SimpleNamespace(position=EYE, fov=0.8, image_height=800))
     phases = ["start", *["update"] * (len(pointers) - 2), "end"]
     for phase, pointer in zip(phases, pointers, strict=True):
         dragging(side, "k1", SimpleNamespace(target=marker, phase=phase, client=client, end_position=pointer))
@@ -116,6 +117,26 @@ def test_a_drag_off_the_scan_goes_back_and_says_so():
 def test_in_the_view_a_nudge_goes_its_length_across_it():
     rolled = Rotation.from_euler("z", 90, degrees=True).as_quat()[[3, 0, 1, 2]]
     np.testing.assert_allclose(nudged_in_view(np.array([1.0, 2, 3]), Nudge((0, 1), 0.002), rolled), (0.998, 2, 3))
+
+
+def test_a_marker_that_is_cut_away_is_not_in_the_hand_and_one_that_is_not_goes_nowhere_beyond_the_cut():
+    state = PickPoint(Side.SCAN, (0.0, 0.0, 3.0)).apply(AppState(("walk",), "walk"))
+    over = ((0, 0, 1), (0.1, 0, 1), (0.1, 0.1, 1))
+    after, marker = drag(state, *over, kept=Kept((Plane((0, 0, 1), 2.0),)))
+    assert after is state
+    np.testing.assert_allclose(marker, (0, 0, 3))
+    after, _ = drag(state, *over, kept=Kept((Plane((1, 0, 0), 0.2),)))
+    assert after.annotation == state.annotation
+    after, _ = drag(state, *over, kept=Kept((Plane((1, 0, 0), 0.4),)))
+    np.testing.assert_allclose(after.annotation.keypoints.pairs[0].scan, (0.3, 0.3, 3), atol=1e-6)
+
+
+def test_in_the_reconstruction_a_drag_takes_no_point_that_is_cut_away():
+    cloud = Cloud(SimpleNamespace(points=np.array([[0.3, 0.3, 4.0], [0.0, 0.0, 2.0]])), Similarity.identity())
+    began = PickPoint(Side.SFM, (0.2, 0.2, 3.0)).apply(AppState(("walk",), "walk"))
+    near, below = np.array([0.3, 0.302, 4.0]) * 3 / 4, Kept((Plane((0, 0, 1), 3.5),))
+    after, _ = drag(began, (0.2, 0.2, 3), (0.1, 0.2, 3), near, side=Side.SFM, cloud=cloud, kept=below)
+    np.testing.assert_allclose(after.annotation.keypoints.pairs[0].sfm, near)
 
 
 def test_moving_a_pair_that_is_gone_or_has_no_place_on_the_scan_changes_nothing():

@@ -6,13 +6,13 @@ length. Angles are between rays from the same eye, so that "8 pixels beside it" 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.raycast import Raycaster
@@ -35,52 +35,65 @@ def pick_mesh(
     origin: ArrayLike,
     direction: ArrayLike,
     front: int = 0,
-    leaves: Callable[[Floats], bool] = lambda _: True,
+    kept: Kept = EVERYTHING,
 ) -> Floats | None:
     """The point (3,) where the ray first meets a face that is drawn, None for a miss.
 
     `front`: 1 where faces are drawn from the side that their normals point to, -1 from the other, 0 from both. A wall
-    that is not drawn from behind must not catch the click on what is seen through it. Nor must what is cut away: points
-    (3,) for which `leaves` is False.
+    that is not drawn from behind must not catch the click on what is seen through it. Nor must what is cut away.
     """
-    start, ray = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+    ray = np.asarray(direction, dtype=np.float64)
+    start = kept.begin(np.asarray(origin, dtype=np.float64), ray)
+    if start is None:
+        return None
     for _ in range(_MOST_FACES_PASSED):
         hits = raycaster.cast(start, ray)
         if not hits.is_hit[0]:
             return None
         if front == 0 or front * float(raycaster.normals(hits)[0] @ ray) < 0:
             point = np.asarray(raycaster.points(hits)[0], dtype=np.float64)
-            if leaves(point):
+            if kept.has(point):
                 return point
         start = start + ray * (float(hits.distance[0]) + _PAST_A_FACE)
     return None
 
 
-def pick_cloud(points: ArrayLike, origin: ArrayLike, direction: ArrayLike, tolerance: float) -> int | None:
+def pick_cloud(
+    points: ArrayLike, origin: ArrayLike, direction: ArrayLike, tolerance: float, kept: Kept = EVERYTHING
+) -> int | None:
     """The front-most of `points` (N, 3) within `tolerance` radians of the ray; of equally near ones the best centred.
 
     Front-most, not best centred: what a person clicks is what they see, and nearer points hide those behind. Points and
-    ray must be in one frame.
+    ray must be in one frame. What is cut away is not meant.
     """
     angles, distances = angles_to_ray(points, origin, direction)
-    within = np.flatnonzero(angles <= tolerance)
+    within = np.flatnonzero((angles <= tolerance) & kept.has(points))
     if len(within) == 0:
         return None
     return int(within[np.lexsort((angles[within], distances[within]))[0]])
 
 
 def pick_frustum(
-    centers: ArrayLike, forward: ArrayLike, origin: ArrayLike, direction: ArrayLike, depth_m: float, tolerance: float
+    centers: ArrayLike,
+    forward: ArrayLike,
+    origin: ArrayLike,
+    direction: ArrayLike,
+    depth_m: float,
+    tolerance: float,
+    kept: Kept = EVERYTHING,
 ) -> int | None:
     """The camera whose pyramid the ray passes best within `tolerance` radians; of equally good ones the nearest.
 
-    `centers` (N, 3), and unit viewing directions `forward` (N, 3); `depth_m` is the pyramids' height.
+    `centers` (N, 3), and unit viewing directions `forward` (N, 3); `depth_m` is the pyramids' height. Of a pyramid that
+    is cut through, what is left counts.
     """
     c, f = np.asarray(centers, dtype=np.float64), np.asarray(forward, dtype=np.float64)
     if len(c) == 0:
         return None
-    along = [angles_to_ray(c + share * depth_m * f, origin, direction) for share in (0.0, 0.5, 1.0)]
-    angles = np.min([angle for angle, _ in along], axis=0)
+    places = [c + share * depth_m * f for share in (0.0, 0.5, 1.0)]
+    along = [angles_to_ray(place, origin, direction) for place in places]
+    seen = [np.where(kept.has(place), angle, np.inf) for place, (angle, _) in zip(places, along, strict=True)]
+    angles = np.min(seen, axis=0)
     best = int(np.lexsort((along[0][1], angles))[0])
     return best if angles[best] <= tolerance else None
 

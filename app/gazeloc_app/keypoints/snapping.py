@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.picking import angles_to_ray
 from gazeloc_core.arrays import Floats
 from gazeloc_core.tag_types import TagCorners
@@ -32,17 +33,18 @@ def snap(
     direction: Floats,
     tolerance_rad: float,
     hit_in_scan: Floats | None = None,
+    kept: Kept = EVERYTHING,
 ) -> Snapped | None:
     """The tag's centre or corner that the ray in the frame `scan` passes best, within the tolerance; None for none.
 
-    `hit_in_scan` is what the ray met: what lies farther behind it is hidden and not meant.
+    `hit_in_scan` is what the ray met: what lies farther behind it is hidden and not meant, nor is what is cut away.
     """
     if tags is None or len(tags) == 0:
         return None
     points = np.concatenate([tags.centers[:, None], tags.corners], axis=1).reshape(-1, 3)
     in_scan = scan_from_tags.apply(points)
     angles, along = angles_to_ray(in_scan, origin, direction)
-    is_near = (angles <= tolerance_rad) & (along > 0)
+    is_near = (angles <= tolerance_rad) & (along > 0) & kept.has(in_scan)
     if hit_in_scan is not None:
         is_near &= along <= float(np.linalg.norm(np.asarray(hit_in_scan) - origin)) + BEHIND_M
     if not is_near.any():

@@ -35,7 +35,9 @@ class CameraTool(Tool):
         every = RigidTransform.concatenate(poses)
         forward = every.rotation.as_matrix()[:, :, 2]
         centers = np.asarray(every.translation)
-        found = picking.pick_frustum(centers, forward, click.origin, click.direction, FRUSTUM_M, bench.tolerance_rad())
+        found = picking.pick_frustum(
+            centers, forward, click.origin, click.direction, FRUSTUM_M, bench.tolerance_rad(), bench.cut.kept
+        )
         if found is None:
             return None
         if found < len(frames):

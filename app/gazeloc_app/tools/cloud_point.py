@@ -26,7 +26,8 @@ class CloudPointTool(Tool):
         if tag is not None:
             return PickPoint(Side.SFM, as_point(tag.point), move=self.bench.moves(), name=tag.name)
         points_in_scan = scan_from_sfm.apply(model.points)
-        found = picking.pick_cloud(points_in_scan, click.origin, click.direction, self.bench.tolerance_rad())
+        tolerance, kept = self.bench.tolerance_rad(), self.bench.cut.kept
+        found = picking.pick_cloud(points_in_scan, click.origin, click.direction, tolerance, kept)
         if found is None:
             return Notify(Level.INFO, "There is no point of the reconstruction under the click.")
         return PickPoint(Side.SFM, as_point(model.points[found]), move=self.bench.moves())

@@ -81,11 +81,11 @@ class Bench:
         if not self.snaps():
             return None
         tolerance = self.tolerance_rad() * NEAR_PX / picking.CLICK_RADIUS_PX
-        return snap(tags, scan_from_tags, click.origin, click.direction, tolerance, hit_in_scan)
+        return snap(tags, scan_from_tags, click.origin, click.direction, tolerance, hit_in_scan, self.cut.kept)
 
     def point_on_scan(self, click: Click) -> Point | None:
         """Where a click meets the scan, in metres; None beside it."""
-        found = picking.pick_mesh(self.data.raycaster(), click.origin, click.direction, self.front(), self.cut.leaves)
+        found = picking.pick_mesh(self.data.raycaster(), click.origin, click.direction, self.front(), self.cut.kept)
         return None if found is None else as_point(found)
 
 
