@@ -32,6 +32,7 @@ from gazeloc_app.drawing.sources import sources_of
 from gazeloc_app.frames.first_pose import FirstPose
 from gazeloc_app.frames.player import Player
 from gazeloc_app.frames.show_route import add_show_route
+from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.live_alignment import LiveAlignment
 from gazeloc_app.keypoints.loupe import add_loupe_route
 from gazeloc_app.looks import Look
@@ -42,6 +43,7 @@ from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
+from gazeloc_app.user_settings import UserSettings
 from gazeloc_app.view_memory import ViewMemory
 from gazeloc_app.visitors import Visitors
 from gazeloc_app.work import tasks
@@ -86,7 +88,8 @@ class App:
             self._saver = Saver(project, self._say_damage)
             self._job_list = JobList(project, self.export_folder, self._say_damage)
             self._room = RoomSaver(project.folder, self._say_damage)
-            first = self.store.state
+            self._settings = UserSettings(self._say_damage)
+            first = self._settings.put_into(self.store.state)
             self.store.begin(self._saver.open(first.recording).with_room_of(self._room.read()).put_into(first))
             self.data.recording(self.store.state.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)
@@ -107,7 +110,7 @@ class App:
         self._browsers: dict[int, Browser] = {}
         self._looks: dict[int, Look] = {}
         self._last_job = 0
-        self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch)
+        self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch, self._kept)
         self.store.add_view(self.scene.render)
         self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
         self.panels = Panels(self._desk())
@@ -119,6 +122,7 @@ class App:
         self.store.add_saver(self._room.save)
         self.store.add_saver(self._saver.commit)
         self.store.add_saver(self._job_list.save)
+        self.store.add_saver(self._settings.save)
         self.store.add_effect(self._saver.settle)
         self.store.add_effect(self._start_job)
         self.store.add_effect(self.live.follow)
@@ -222,6 +226,10 @@ class App:
         look = self._looks.get(client_id)
         if look is not None:
             look.toggle()
+
+    def _kept(self, client_id: int) -> Kept:
+        browser = self._browsers.get(client_id)
+        return EVERYTHING if browser is None else browser.kept
 
     def _open_recording(self, name: str) -> None:
         try:

@@ -1,13 +1,19 @@
-"""Every colour of the app's own: its brand, what words and marks mean, and the sets of cameras in the scene.
+"""Every colour of the app's own: its brand, what words and marks mean, and what is drawn in the scene and in charts.
 
-Ground truth is green and the estimate red, as in the paper. Eyes that do not tell the two hues apart tell them by their
-lightness: truth is light, the estimate dark. tests/app/test_palette.py holds that, and that text is legible in
-light and dark.
+Within each set, colours differ for protan, deutan and tritan eyes too, and from the ground in light and dark, mostly by
+their lightness: tests/app/test_palette.py simulates these eyes. Ground truth is green and the estimate red, as in the
+paper; people who would rather have two hues that they see as two switch to `SAFE`, blue and orange.
 """
 
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gazeloc_core.marks import Mark
+from gazeloc_core.methods import Method
+from gazeloc_core.trajectory import PoseStatus
 
 Rgb = tuple[int, int, int]
 
@@ -15,9 +21,94 @@ BRAND: Rgb = (28, 110, 140)
 """Of buttons and of the tab that is open."""
 BRAND_DARK: Rgb = (84, 178, 214)
 """The same in the dark, where letters on it are black."""
-TRUTH: Rgb = (60, 200, 130)
-ESTIMATE: Rgb = (200, 20, 20)
-PHONE: Rgb = (70, 110, 200)
+UNDER: Rgb = (100, 106, 114)
+"""Of the truth while the estimates' colours stand for something, its own among them."""
+STATUSES: Mapping[PoseStatus, Rgb] = {
+    PoseStatus.REGISTERED: (0, 114, 178),
+    PoseStatus.TRACKED: (120, 240, 150),
+    PoseStatus.INTERPOLATED: (235, 165, 0),
+    PoseStatus.TAG_ONLY: (150, 0, 240),
+    PoseStatus.REJECTED: (130, 0, 0),
+    PoseStatus.NONE: (150, 150, 150),
+}
+MARKS: Mapping[Mark, Rgb] = {Mark.GOOD: (0, 114, 178), Mark.BAD: (150, 0, 0), Mark.UNSURE: (235, 165, 0)}
+SCORE: Rgb = (28, 110, 140)
+ERROR: Rgb = (210, 90, 30)
+"""Of curves over the frames."""
+SCAN_SIDE: Rgb = (255, 120, 0)
+SFM_SIDE: Rgb = (0, 200, 255)
+SELECTED: Rgb = (150, 0, 150)
+DISABLED: Rgb = (120, 120, 120)
+"""Of keypoints; in frames the first is for what was clicked, the second for where it is expected."""
+RESIDUAL: Rgb = (220, 30, 40)
+SCAN_TAGS: Rgb = (20, 120, 220)
+SFM_TAGS: Rgb = (235, 130, 20)
+FILTERED_OUT: Rgb = (120, 120, 120)
+"""Points under a tag that the paper's filter drops."""
+POINTS: Rgb = (90, 160, 220)
+"""Points of a reconstruction without colours."""
+SHOWN_FRAME: Rgb = (255, 200, 0)
+GAZE: Rgb = (230, 60, 200)
+TAPE: Rgb = (0, 190, 235)
+GROUND: Rgb = (150, 158, 168)
+AXES: tuple[Rgb, Rgb, Rgb] = ((213, 94, 0), (0, 158, 115), (0, 114, 178))
+"""Of the grid, and of x, y and z."""
+SERIES: tuple[Rgb, ...] = ((28, 110, 140), (210, 90, 30), (150, 30, 240), (90, 30, 0), (0, 240, 150), (240, 210, 0))
+"""Of charts."""
+CHART_TEXT: Rgb = (123, 135, 148)
+"""Legible in light and dark."""
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """The colours of the sets of cameras, and the words for the first three."""
+
+    truth: Rgb
+    estimate: Rgb
+    phone: Rgb
+    methods: Mapping[Method, Rgb]
+    """Of methods that are compared with the chosen one, which has the estimate's."""
+    words: tuple[str, str, str]
+
+
+USUAL = Cameras(
+    truth=(60, 200, 130),
+    estimate=(200, 20, 20),
+    phone=(70, 110, 200),
+    methods={
+        Method.SFM: (120, 0, 240),
+        Method.SFM_PAPER: (240, 150, 0),
+        Method.TAGS: (150, 90, 120),
+        Method.TAGS_PAPER: (60, 0, 90),
+        Method.GLOBAL: (240, 180, 240),
+    },
+    words=("green", "red", "blue"),
+)
+SAFE = Cameras(
+    truth=(0, 100, 180),
+    estimate=(235, 140, 0),
+    phone=(110, 110, 120),
+    methods={
+        Method.SFM: (150, 0, 240),
+        Method.SFM_PAPER: (240, 210, 150),
+        Method.TAGS: (0, 210, 240),
+        Method.TAGS_PAPER: (120, 0, 0),
+        Method.GLOBAL: (90, 0, 90),
+    },
+    words=("blue", "orange", "grey"),
+)
+
+
+def cameras(*, are_safe: bool) -> Cameras:
+    """The colours in force."""
+    return SAFE if are_safe else USUAL
+
+
+def hexadecimal(color: Rgb) -> str:
+    """E.g. "#c81414"."""
+    return "#" + bytes(color).hex()
+
+
 BACKGROUND: Rgb = (233, 236, 239)
 """Behind the scene, in the light."""
 BACKGROUND_DARK: Rgb = (33, 37, 41)

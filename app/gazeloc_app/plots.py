@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
+from gazeloc_app.palette import CHART_TEXT, SERIES, hexadecimal
 from gazeloc_core.charts import Chart, Drawing, HeatMap, Series
-
-_COLORS = ("#1971c2", "#e8590c", "#2f9e44", "#9c36b5", "#c92a2a", "#0c8599")
 
 
 def to_plotly(drawing: Drawing) -> go.Figure:
@@ -20,14 +19,14 @@ def to_plotly(drawing: Drawing) -> go.Figure:
         )
     else:
         for number, row in enumerate(drawing.series):
-            _add(figure, row, _COLORS[number % len(_COLORS)])
+            _add(figure, row, hexadecimal(SERIES[number % len(SERIES)]))
     figure.update_layout(
         title={"text": drawing.title, "font": {"size": 13}},
         xaxis_title=drawing.x_label,
         yaxis_title=drawing.y_label,
         margin={"l": 50, "r": 10, "t": 40, "b": 40},
         legend={"orientation": "h", "y": -0.2},
-        font={"size": 11, "color": "#7b8794"},  # legible in light and dark
+        font={"size": 11, "color": hexadecimal(CHART_TEXT)},
         template="plotly_white",
         paper_bgcolor="rgba(0,0,0,0)",
         plot_bgcolor="rgba(0,0,0,0)",

@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.once import Once
-from gazeloc_app.palette import ESTIMATE, PHONE, TRUTH
+from gazeloc_app.palette import STATUSES, UNDER
 from gazeloc_app.scene.errors import ErrorsLayer
 from gazeloc_app.scene.frusta import CameraSet, FrustaLayer
 from gazeloc_app.state import AppState, Coloring, Layer
@@ -23,26 +23,8 @@ from gazeloc_core.color_scale import NO_VALUE, ColorScale
 from gazeloc_core.evaluate import match_times
 from gazeloc_core.glb import Rgb
 from gazeloc_core.methods import Method
-from gazeloc_core.trajectory import PoseStatus, Trajectory
+from gazeloc_core.trajectory import Trajectory
 
-GREEN, RED, BLUE = TRUTH, ESTIMATE, PHONE
-METHOD_COLORS = {
-    Method.SFM: (130, 60, 200),
-    Method.SFM_PAPER: (240, 140, 0),
-    Method.TAGS: (0, 150, 150),
-    Method.TAGS_PAPER: (130, 90, 50),
-    Method.GLOBAL: (215, 60, 175),
-}
-"""Of methods that are compared with the chosen one, which is always red."""
-STATUS_COLORS: dict[PoseStatus, Rgb] = {
-    PoseStatus.REGISTERED: (0, 114, 178),
-    PoseStatus.TRACKED: (86, 180, 233),
-    PoseStatus.INTERPOLATED: (230, 159, 0),
-    PoseStatus.TAG_ONLY: (204, 121, 167),
-}
-"""After Okabe and Ito's colours, which colour-blind eyes tell apart."""
-GREY = (100, 106, 114)
-"""Of the truth while the estimates' colours stand for something, green among them."""
 MANY = 400
 """More cameras of one set than this hide the room: unless somebody says otherwise they are thinned out to as many."""
 
@@ -65,7 +47,9 @@ class SceneCameras:
         camera = self._data.camera(state.recording)
         camera = camera if camera is not None and camera.is_pinhole else None
         truth, step = self._data.true_keyframes(state.recording), self.thinning(state)
-        color = state.annotation.tint(Layer.TRUTH) or (GREEN if state.layers.coloring is Coloring.SET else GREY)
+        color = state.annotation.tint(Layer.TRUTH) or (
+            state.cameras.truth if state.layers.coloring is Coloring.SET else UNDER
+        )
         self._once("truth", (truth, camera, color, step), lambda: self.truth.show(_thinned(truth, camera, color, step)))
         scale = self.scale(state)
         for method in Method:
@@ -90,7 +74,7 @@ class SceneCameras:
         return ColorScale.of_errors(values) if is_error else ColorScale.of_range(values)
 
     def _draw_phone(self, state: AppState) -> None:
-        scan, tint = self._data.scan(), state.annotation.tint(Layer.PHONE)
+        scan, color = self._data.scan(), state.annotation.tint(Layer.PHONE) or state.cameras.phone
 
         def show() -> None:
             poses = [frame.scan_from_camera for frame in scan.frames]
@@ -99,9 +83,9 @@ class SceneCameras:
                 self.phone.show(None)
                 return
             step = max(1, -(-len(poses) // MANY))
-            self.phone.show(_thinned(RigidTransform.concatenate(poses), camera, tint or BLUE, step))
+            self.phone.show(_thinned(RigidTransform.concatenate(poses), camera, color, step))
 
-        self._once("phone", (scan, tint), show)
+        self._once("phone", (scan, color), show)
 
     def _draw_method(
         self, state: AppState, method: Method, camera: Camera | None, step: int, scale: ColorScale | None
@@ -110,7 +94,7 @@ class SceneCameras:
         layer = self.estimate if is_chosen else self.compared[method]
         trajectory = self._trajectory(state, method) if is_chosen or method in state.compared else None
         tint = state.annotation.tint(Layer.ESTIMATE) if is_chosen else None
-        color: Rgb = tint or (RED if is_chosen else METHOD_COLORS[method])
+        color: Rgb = tint or (state.cameras.estimate if is_chosen else state.cameras.methods[method])
         coloring = state.layers.coloring
         values = self._values(state, method) if trajectory is not None else None
 
@@ -194,7 +178,7 @@ def _colors(
     count = len(trajectory)
     if coloring is Coloring.STATUS:
         colors = np.tile(np.array(NO_VALUE, dtype=np.uint8), (count, 1))
-        for status, of_status in STATUS_COLORS.items():
+        for status, of_status in STATUSES.items():
             colors[trajectory.status == status.value] = of_status
         return colors
     if coloring is Coloring.SET:

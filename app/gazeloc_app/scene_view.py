@@ -18,8 +18,10 @@ from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.render_worker import Frame
 from gazeloc_app.drawing.scan_screen import ScanScreen
 from gazeloc_app.frames.gaze_at import gaze_in_scan
+from gazeloc_app.kept import Kept
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
+from gazeloc_app.palette import FILTERED_OUT, SCAN_TAGS, SFM_TAGS
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
@@ -32,6 +34,7 @@ from gazeloc_app.scene.view import set_start
 from gazeloc_app.scene_cameras import SceneCameras
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.arrays import Bytes
+from gazeloc_core.glb import WHITE
 from gazeloc_core.palette import colors_of_ids
 from gazeloc_core.scan import Mesh
 from gazeloc_core.scan_display import glimpse
@@ -40,10 +43,6 @@ from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
 from gazeloc_core.viewpoint import room_corners
 
-SCAN_TAG, SFM_TAG = (20, 120, 220), (235, 130, 20)
-WHITE = (255, 255, 255)
-FILTERED_OUT = (120, 120, 120)
-"""Points under a tag that the paper's filter drops."""
 THUMBNAIL_PX = 320
 GLIMPSE_POINTS = 60_000
 
@@ -57,7 +56,9 @@ class SceneView:
         data: ProjectData,
         render: RenderProcess,
         dispatch: Callable[[Action], None],
+        kept: Callable[[int], Kept],
     ):
+        """`kept(client_id)` is what a browser's cuts leave of the room."""
         self._server, self._data, self._render = server, data, render
         self._screen = ScanScreen(data, render, dispatch)
         scene = server.scene
@@ -71,10 +72,10 @@ class SceneView:
         self._glimpse = CloudLayer(scene, "/scan-glimpse", point_size_m=0.015)
         self._cloud = CloudLayer(scene)
         self._tag_points = CloudLayer(scene, "/sfm/tag-points", point_size_m=0.022)
-        self._scan_tags = TagsLayer(scene, "scan", SCAN_TAG)
-        self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAG, suffix="′")
+        self._scan_tags = TagsLayer(scene, "scan", SCAN_TAGS)
+        self._sfm_tags = TagsLayer(scene, "sfm", SFM_TAGS, suffix="′")
         self.cameras = SceneCameras(scene, data)
-        self._dragging = Dragging(data, lambda: self.front, dispatch)
+        self._dragging = Dragging(data, lambda: self.front, dispatch, kept)
         self._keypoints = KeypointsLayer(scene, on_drag=self._dragging)
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)

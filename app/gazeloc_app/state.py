@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+from gazeloc_app import palette
 from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.marks import FrameMarks
@@ -166,6 +167,8 @@ class LayerSettings:
 
     hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS, Layer.GRID})
     coloring: Coloring = Coloring.SET
+    are_colors_safe: bool = False
+    """Whether the sets of cameras have the colours for colour-blind eyes."""
     thinning: int | None = None
     """Every how many of the recording's cameras one is drawn; None leaves it to their number."""
 
@@ -229,6 +232,11 @@ class AppState:
     """Counts up whenever a stage finished, so that views read its artifacts anew."""
     renderer_note: str = ""
     """What to say about the renderer of pictures where it stands in for the usual one."""
+
+    @property
+    def cameras(self) -> palette.Cameras:
+        """The colours of the sets of cameras."""
+        return palette.cameras(are_safe=self.layers.are_colors_safe)
 
     @property
     def jobs(self) -> tuple[Job, ...]:

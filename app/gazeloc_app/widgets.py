@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from gazeloc_app import palette
+from gazeloc_core.marks import Mark
 
 GOOD, WARNING, BAD, MUTED = (palette.meaning(name) for name in palette.TEXT_MEANINGS)
+MARK_COLORS = {Mark.GOOD: GOOD, Mark.BAD: BAD, Mark.UNSURE: WARNING}
 LEVEL_COLORS = {"good": GOOD, "info": MUTED, "warning": WARNING, "bad": BAD, "error": BAD}
 
 

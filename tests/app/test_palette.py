@@ -7,12 +7,45 @@ import pytest
 import viser
 from gazeloc_app import palette
 from gazeloc_app.looks import set_theme
-from gazeloc_app.scene_cameras import STATUS_COLORS
+from gazeloc_app.plots import to_plotly
 from viser._messages import ThemeConfigurationMessage
 
-# Viénot, Brettel and Mollon 1999: what a deuteranope and a protanope see of linear sRGB.
-DEUTERANOPE = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
-PROTANOPE = np.array([[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]])
+from gazeloc_core.charts import Chart, Series
+from gazeloc_core.marks import Mark
+from gazeloc_core.methods import Method
+from gazeloc_core.trajectory import PoseStatus
+
+# Machado, Oliveira and Fernandes 2009, severity 1: what eyes without one kind of cone see of linear sRGB.
+EYES = {
+    "usual": np.eye(3),
+    "protan": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "deutan": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+    "tritan": np.array(
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+    ),
+}
+
+
+def _cameras_of(one):
+    return one.truth, one.estimate, one.phone, *one.methods.values()
+
+
+SETS = {
+    "usual cameras": _cameras_of(palette.USUAL),
+    "safe cameras": _cameras_of(palette.SAFE),
+    "statuses": tuple(palette.STATUSES.values()),
+    "marks": tuple(palette.MARKS.values()),
+    "keypoints": (palette.SCAN_SIDE, palette.SFM_SIDE, palette.SELECTED, palette.DISABLED),
+    "tags": (palette.SCAN_TAGS, palette.SFM_TAGS),
+    "curves": (palette.SCORE, palette.ERROR),
+    "series": palette.SERIES,
+}
+APART, FROM_THE_GROUND = 24, 18
+"""CIE 1976 colour differences: 2 is just seen side by side, 10 at a glance."""
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 WHITE = XYZ.sum(axis=1)
 
@@ -67,22 +100,45 @@ def test_visers_buttons_come_out_in_the_brands_colour(is_dark, shade, brand):
     assert np.abs(np.array(list(made)) - brand).max() <= 3
 
 
-@pytest.mark.parametrize("eyes", [np.eye(3), DEUTERANOPE, PROTANOPE], ids=["three", "deuteranope", "protanope"])
-def test_truth_estimate_and_phone_are_told_apart(eyes):
-    for a, b in itertools.combinations((palette.TRUTH, palette.ESTIMATE, palette.PHONE), 2):
-        assert apart(a, b, eyes) >= 30
+@pytest.mark.parametrize("eyes", EYES)
+@pytest.mark.parametrize("name", SETS)
+def test_the_colours_of_a_set_are_told_apart_by_all_eyes(name, eyes):
+    for a, b in itertools.combinations(SETS[name], 2):
+        assert apart(a, b, EYES[eyes]) >= APART, (a, b)
 
 
-def test_the_measure_knows_colours_that_are_confused():
-    """Red and green of one lightness: what the palette must not be."""
-    assert apart((215, 60, 40), (90, 130, 40), np.eye(3)) > 70
-    assert apart((215, 60, 40), (90, 130, 40), DEUTERANOPE) < 25
+@pytest.mark.parametrize("eyes", EYES)
+@pytest.mark.parametrize("name", SETS)
+def test_every_colour_stands_out_from_the_ground_in_light_and_dark(name, eyes):
+    for color, ground in itertools.product(SETS[name], (palette.BACKGROUND, palette.BACKGROUND_DARK)):
+        assert apart(color, ground, EYES[eyes]) >= FROM_THE_GROUND, (color, ground)
 
 
-@pytest.mark.parametrize("eyes", [DEUTERANOPE, PROTANOPE], ids=["deuteranope", "protanope"])
-def test_statuses_are_told_apart(eyes):
-    for a, b in itertools.combinations(STATUS_COLORS.values(), 2):
-        assert apart(a, b, eyes) >= 20
+def test_colour_blind_eyes_see_truth_and_estimate_as_two_hues_in_the_safe_set():
+    """In the usual set they are one hue, told apart by lightness."""
+    for eyes in ("protan", "deutan"):
+        hues = [lab(EYES[eyes] @ linear(color))[1:] for color in (palette.SAFE.truth, palette.SAFE.estimate)]
+        assert np.dot(*hues) < 0
+        usual = [lab(EYES[eyes] @ linear(color))[1:] for color in (palette.USUAL.truth, palette.USUAL.estimate)]
+        assert np.dot(*usual) > 0
+
+
+def test_the_simulation_leaves_grey_grey_and_confuses_what_such_eyes_confuse():
+    for eyes in EYES.values():
+        np.testing.assert_allclose(eyes.sum(axis=1), 1, atol=1e-5)
+    assert apart((215, 60, 40), (90, 130, 40), EYES["usual"]) > 70
+    assert apart((215, 60, 40), (110, 100, 40), EYES["deutan"]) < 25
+    assert apart((0, 150, 150), (215, 60, 175), EYES["deutan"]) < 15, "two methods' colours until this was tested"
+
+
+def test_every_status_mark_and_method_has_a_colour_and_charts_use_the_series():
+    assert set(palette.STATUSES) == set(PoseStatus)
+    assert set(palette.MARKS) == set(Mark)
+    assert set(palette.USUAL.methods) == set(palette.SAFE.methods) == set(Method)
+    chart = Chart("t", "x", "y", tuple(Series(str(n), [0.0, 1.0], [0.0, 1.0]) for n in range(7)))
+    colors = [trace.line.color for trace in to_plotly(chart).data]
+    assert colors[:6] == [palette.hexadecimal(color) for color in palette.SERIES]
+    assert colors[6] == colors[0]
 
 
 def test_every_meaning_has_a_shade_for_the_dark():

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
+from gazeloc_app.palette import SCAN_TAGS, SELECTED
 from gazeloc_app.routes import Routes
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import FrameInSceneLayer, SelectedFrameLayer, look_through, picture_plane
 from gazeloc_app.scene.frusta import EDGES, FEW_EDGES, MANY, CameraSet, FrustaLayer, _lines, frustum_points
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.grid import GridLayer, grid_lines
-from gazeloc_app.scene.keypoints import SELECTED, KeypointsLayer
+from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
-from gazeloc_app.scene.tags import SCAN_TAGS, TagsLayer
+from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import FOV_RAD, overview, set_start, up_vector
 from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation

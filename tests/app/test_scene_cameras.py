@@ -9,13 +9,15 @@ import pytest
 from app_project import make_app_project, true_poses
 from app_steps import step, stop
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
-from gazeloc_app.actions.views import ColorCameras, ShowLayer, ThinCameras
+from gazeloc_app.actions.views import ColorCameras, ShowLayer, ThinCameras, UseSafeColors
 from gazeloc_app.app import App
+from gazeloc_app.palette import SAFE, STATUSES, USUAL
 from gazeloc_app.panels.camera_colors import legend
 from gazeloc_app.scene.frusta import EDGES
-from gazeloc_app.scene_cameras import RED, STATUS_COLORS
-from gazeloc_app.state import Coloring, Layer
+from gazeloc_app.state import AppState, Coloring, Layer
+from gazeloc_app.user_settings import UserSettings, settings_path
 
+from gazeloc_core.errors import GazelocError
 from gazeloc_core.glb import linear_from_srgb
 from gazeloc_core.methods import Method
 from gazeloc_core.stages import inputs
@@ -82,7 +84,7 @@ def test_a_step_out_of_range_is_brought_into_it(app):
 
 def test_colours_stand_for_the_method_the_error_or_the_status(app):
     close = lambda a, b: np.abs(a - b).max() < 1e-4  # noqa: E731
-    assert close(lines_of(app, "/frusta/estimate")[1], linear_from_srgb(RED))
+    assert close(lines_of(app, "/frusta/estimate")[1], linear_from_srgb(USUAL.estimate))
     step(app, ColorCameras(Coloring.ERROR))
     scale = app.scene.cameras.scale(app.store.state)
     assert scale.high == pytest.approx(0.05)
@@ -92,8 +94,46 @@ def test_colours_stand_for_the_method_the_error_or_the_status(app):
     assert close(colors[6:12], expected[1])
     step(app, ColorCameras(Coloring.STATUS))
     colors = lines_of(app, "/frusta/estimate")[1]
-    assert close(colors[:6], linear_from_srgb(STATUS_COLORS[PoseStatus.TAG_ONLY]))
-    assert close(colors[6:12], linear_from_srgb(STATUS_COLORS[PoseStatus.REGISTERED]))
+    assert close(colors[:6], linear_from_srgb(STATUSES[PoseStatus.TAG_ONLY]))
+    assert close(colors[6:12], linear_from_srgb(STATUSES[PoseStatus.REGISTERED]))
+
+
+def test_the_switch_gives_all_sets_the_colours_for_colour_blind_eyes_and_is_kept_for_every_project(app):
+    close = lambda a, b: np.abs(a - b).max() < 1e-4  # noqa: E731
+    before = len(app.store.state.past)
+    step(app, UseSafeColors(True))
+    assert close(lines_of(app, "/frusta/estimate")[1], linear_from_srgb(SAFE.estimate))
+    assert close(lines_of(app, "/frusta/truth")[1], linear_from_srgb(SAFE.truth))
+    handles = app.server.gui._gui_input_handle_from_uuid.values()
+    labels = {handle.label: handle for handle in handles if hasattr(handle, "label")}
+    assert "orange" in labels["Estimate"].hint
+    assert "blue" in labels["Ground truth"].hint
+    assert labels["Colours for colour-blind eyes"].value is True
+    assert len(app.store.state.past) == before
+    assert UserSettings().put_into(AppState(("a",), "a")).cameras is SAFE
+    step(app, ChooseMethod(Method.SFM), CompareMethod(Method.TAGS, True))
+    assert close(lines_of(app, "/frusta/methods/tags")[1], linear_from_srgb(SAFE.methods[Method.TAGS]))
+    step(app, UseSafeColors(False), ChooseMethod(Method.TAGS))
+    assert close(lines_of(app, "/frusta/estimate")[1], linear_from_srgb(USUAL.estimate))
+    assert UserSettings().put_into(AppState(("a",), "a")).cameras is USUAL
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"safe_colors": "yes"}', '{"other": 1}'])
+def test_settings_that_cannot_be_read_leave_everything_as_usual(text, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    settings_path().parent.mkdir()
+    settings_path().write_text(text)
+    told = []
+    assert UserSettings(told.append).put_into(AppState(("a",), "a")).cameras is USUAL
+    assert bool(told) == (text in ("{", "[]"))
+
+
+def test_settings_that_cannot_be_written_are_said(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    usual = AppState(("a",), "a")
+    with pytest.raises(GazelocError, match="could not be kept"):
+        UserSettings().save(usual, UseSafeColors(True).apply(usual))
 
 
 def test_lines_go_from_the_estimates_to_the_truth(app):

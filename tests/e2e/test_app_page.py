@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from app_project import BOXES, SFM_FROM_SCAN, WALLS, true_poses
 from e2e.app_page import AppPage
-from gazeloc_app.scene_cameras import RED
+from gazeloc_app.palette import USUAL
 from gazeloc_app.state import Layer
 from gazeloc_app.tools.camera import CameraTool
 from gazeloc_app.tools.cloud_point import CloudPointTool
@@ -186,11 +186,11 @@ def test_aligning_puts_red_cameras_where_the_glasses_were_and_clicking_one_goes_
     page.tab("Layers")
     page.field("Ground truth").click()
     page.until(lambda: bool(page.state.layers.hidden))
-    assert [page.pixels_near(place, RED) for place in registered] == [0] * 8
+    assert [page.pixels_near(place, USUAL.estimate) for place in registered] == [0] * 8
     align(page)
     page.viewer.wait_for_node("/frusta/estimate")
     page.viewer.save("app-aligned")
-    assert min(page.pixels_near(place, RED) for place in registered) > 5
+    assert min(page.pixels_near(place, USUAL.estimate) for place in registered) > 5
     assert page.page.get_by_text("Keypoints, RMS").count() == 1
     page.viewer.click_at_point(registered[5])
     page.until(lambda: page.state.frame == 10)

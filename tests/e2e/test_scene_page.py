@@ -13,7 +13,7 @@ from gazeloc_app.scene import frusta, tags
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import PLANE_M, FrameInSceneLayer, SelectedFrameLayer, look_through
 from gazeloc_app.scene.gaze import GazeLayer
-from gazeloc_app.scene.keypoints import SCAN_SIDE, KeypointsLayer
+from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.server import make_server
@@ -158,9 +158,9 @@ def test_layers_appear_where_they_belong_and_hide(server, open_page):
     keypoints.show(KeypointSet((KeypointPair("k1", "desk corner", place, None),)), None)
     estimate = frusta.FrustaLayer(server.scene, "estimate", depth_m=0.4)
     pose = RigidTransform.from_components([[2.5, 1.0, 1.2]], Rotation.from_euler("x", [-90], degrees=True))
-    estimate.show(frusta.CameraSet(pose, CAMERA, palette.ESTIMATE))
+    estimate.show(frusta.CameraSet(pose, CAMERA, palette.USUAL.estimate))
     corners = np.array([[[0.01, 1, 1], [0.01, 1.4, 1], [0.01, 1.4, 1.4], [0.01, 1, 1.4]]])
-    outlines = tags.TagsLayer(server.scene, "scan", tags.SCAN_TAGS)
+    outlines = tags.TagsLayer(server.scene, "scan", palette.SCAN_TAGS)
     outlines.show(TagCorners(np.array([7]), corners, np.array([3]), np.array([0.001])))
     gaze = GazeLayer(server.scene)
     gaze.show(np.array([3.0, 2.0, 1.4]), hit=np.array([0.0, 0.4, 0.5]))
@@ -171,13 +171,13 @@ def test_layers_appear_where_they_belong_and_hide(server, open_page):
         page.wait_for_node(name)
     page.save("layers")
     assert np.abs(page.color_at(point) - (1, 2, 250)).max() <= 2
-    assert page.has_color_near(place, SCAN_SIDE)
+    assert page.has_color_near(place, palette.SCAN_SIDE)
     assert page.label_at(place)
     assert page.label_at(corners[0].mean(axis=0))
-    assert pixels_of(page, palette.ESTIMATE) > 50
+    assert pixels_of(page, palette.USUAL.estimate) > 50
     for layer in (cloud, keypoints, estimate, outlines, gaze):
         layer.set_visible(False)
-    page.wait_until(lambda: pixels_of(page, palette.ESTIMATE) == 0)
+    page.wait_until(lambda: pixels_of(page, palette.USUAL.estimate) == 0)
     page.wait_until(lambda: not page.label_at(place))
     assert page.color_at(point).tolist() in [list(color) for color in WALLS.values()]
 

@@ -123,6 +123,17 @@ class ColorCameras:
 
 
 @dataclass(frozen=True)
+class UseSafeColors:
+    """The sets of cameras shall have the colours for colour-blind eyes, or the usual ones."""
+
+    is_on: bool
+
+    def apply(self, state: AppState) -> AppState:
+        """The state with it."""
+        return replace(state, layers=replace(state.layers, are_colors_safe=self.is_on))
+
+
+@dataclass(frozen=True)
 class NameRenderer:
     """The renderer of pictures is known; `note` is the sentence to show where it stands in for the usual one."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazeloc_app import widgets
+from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal
 from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Floats
 from gazeloc_core.marks import FrameMarks, Mark
@@ -20,14 +21,7 @@ from gazeloc_core.trajectory import PoseStatus, Trajectory
 PARTS = 400
 """A longer recording is drawn in this many parts, each with its worst frame."""
 _WORST_FIRST = ("rejected", "none", "tag_only", "interpolated", "tracked", "registered")
-STATUS_COLORS = {  # by Okabe and Ito, told apart by eyes that see red and green alike
-    PoseStatus.REGISTERED.value: "#009e73",
-    PoseStatus.TRACKED.value: "#0072b2",
-    PoseStatus.INTERPOLATED.value: "#56b4e9",
-    PoseStatus.TAG_ONLY.value: "#e69f00",
-    PoseStatus.REJECTED.value: "#d55e00",
-    PoseStatus.NONE.value: "#adb5bd",
-}
+STATUS_COLORS = {status.value: hexadecimal(color) for status, color in STATUSES.items()}
 STATUS_NAMES = {
     PoseStatus.REGISTERED.value: "registered",
     PoseStatus.TRACKED.value: "tracked",
@@ -36,7 +30,7 @@ STATUS_NAMES = {
     PoseStatus.REJECTED.value: "rejected",
     PoseStatus.NONE.value: "none",
 }
-MARK_COLORS = {Mark.GOOD: "#009e73", Mark.BAD: "#d55e00", Mark.UNSURE: "#e6b800"}
+MARK_COLORS = {mark: hexadecimal(color) for mark, color in MARKS.items()}
 MARK_SIGNS = {Mark.GOOD: "✓", Mark.BAD: "✗", Mark.UNSURE: "?"}
 
 
@@ -53,12 +47,12 @@ def timeline_html(
         if (status == name).any()
     ]
     if np.isfinite(score).any():
-        rows.append(_curve(score, 1.0, "#1c6e8c", limit=LOW_SCORE))
-        legend.append(f'<i style="background:#1c6e8c"></i>agreement 0–1, dashed {LOW_SCORE:g}')
+        rows.append(_curve(score, 1.0, hexadecimal(SCORE), limit=LOW_SCORE))
+        legend.append(f'<i style="background:{hexadecimal(SCORE)}"></i>agreement 0–1, dashed {LOW_SCORE:g}')
     if error_m is not None and np.isfinite(error_m).any():
         top = max(float(np.nanpercentile(error_m, 98)), 1e-6)
-        rows.append(_curve(-error_m, 0.0, "#9c36b5", low=-top))
-        legend.append(f'<i style="background:#9c36b5"></i>error, down to {100 * top:.1f} cm')
+        rows.append(_curve(-error_m, 0.0, hexadecimal(ERROR), low=-top))
+        legend.append(f'<i style="background:{hexadecimal(ERROR)}"></i>error, down to {100 * top:.1f} cm')
     url = widgets.text(f"/show/{quote(recording)}/")
     return (
         f'<div class="gazeloc-timeline" data-show="{url}" data-last="{count - 1}"'

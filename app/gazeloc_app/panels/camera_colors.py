@@ -9,7 +9,8 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import MAX_THINNING, ColorCameras, ThinCameras
-from gazeloc_app.scene_cameras import STATUS_COLORS, SceneCameras
+from gazeloc_app.palette import STATUSES, Rgb, hexadecimal
+from gazeloc_app.scene_cameras import SceneCameras
 from gazeloc_app.state import AppState, Coloring
 from gazeloc_core.color_scale import NO_VALUE, ColorScale
 
@@ -60,9 +61,7 @@ def legend(coloring: Coloring, scale: ColorScale | None) -> str:
     if coloring is Coloring.SET:
         return ""
     if coloring is Coloring.STATUS:
-        entries = [
-            f"{_swatch(color)} {widgets.text(status.replace('_', ' '))}" for status, color in STATUS_COLORS.items()
-        ]
+        entries = [f"{_swatch(color)} {widgets.text(status.replace('_', ' '))}" for status, color in STATUSES.items()]
         return widgets.box(" &nbsp; ".join(entries))
     if scale is None:
         return widgets.box(_NONE[coloring])
@@ -75,5 +74,5 @@ def legend(coloring: Coloring, scale: ColorScale | None) -> str:
     return widgets.box(f"{bar}{row}{_swatch(NO_VALUE)} not known")
 
 
-def _swatch(color: tuple[int, int, int]) -> str:
-    return widgets.colored("■", "rgb({},{},{})".format(*color))
+def _swatch(color: Rgb) -> str:
+    return widgets.colored("■", hexadecimal(color))

@@ -17,7 +17,7 @@ from gazeloc_app.actions.views import CompareWith, DrawTags, ShowFrame
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.offset_text import offset_text
 from gazeloc_app.frames.sightings import image_of_frame
-from gazeloc_app.frames.timeline_html import MARK_COLORS, MARK_SIGNS, timeline_html
+from gazeloc_app.frames.timeline_html import MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
 from gazeloc_app.panels.playing import PlayWidgets
@@ -115,7 +115,7 @@ class FramePanel:
         lines = [widgets.text(fact) for fact in facts if fact]
         mark = state.annotation.marks.get(frame)
         if mark is not None:
-            lines.append(widgets.colored(f"{MARK_SIGNS[mark.mark]} marked {mark.mark}", MARK_COLORS[mark.mark]))
+            lines.append(widgets.colored(f"{MARK_SIGNS[mark.mark]} marked {mark.mark}", widgets.MARK_COLORS[mark.mark]))
         return "<br>".join(lines)
 
     def _score_text(self, state: AppState, frame: int) -> str:

@@ -11,7 +11,8 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
-from gazeloc_app.actions.views import ShowLayer, TintLayer
+from gazeloc_app.actions.views import ShowLayer, TintLayer, UseSafeColors
+from gazeloc_app.palette import USUAL, Cameras
 from gazeloc_app.state import AppState, Layer, LayerSettings
 
 HINTS = {
@@ -19,10 +20,10 @@ HINTS = {
     Layer.POINTS: "The sparse points of the glasses' reconstruction; where they stand before it is aligned is a guess.",
     Layer.SCAN_TAGS: "Tags as the phone saw them, blue.",
     Layer.SFM_TAGS: "Tags as the glasses saw them, orange, numbers with a prime (3′).",
-    Layer.PHONE: "The phone's cameras, blue.",
-    Layer.TRUTH: "The glasses' true poses, green, where the project was given any.",
-    Layer.ESTIMATE: "The glasses' estimated poses, red; the frame that is shown, yellow.",
-    Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, pink the selected pair.",
+    Layer.PHONE: "The phone's cameras, {}.",
+    Layer.TRUTH: "The glasses' true poses, {}, where the project was given any.",
+    Layer.ESTIMATE: "The glasses' estimated poses, {}; the frame that is shown, yellow.",
+    Layer.KEYPOINTS: "Clicked points: orange on the scan, blue in the reconstruction, purple the selected pair.",
     Layer.TAG_POINTS: "The reconstruction's points under tags; those that the paper's filter drops are grey.",
     Layer.ERRORS: "Lines from the estimated cameras to the true ones, coloured by their length.",
     Layer.GRID: "Squares of one metre on the floor, and the scan's axes; an arrow marks the one that is up.",
@@ -31,6 +32,8 @@ HINTS = {
 }
 _SAME_STROKE_S = 1.5
 """A colour field sends a colour at every movement of the pointer; a rest of so long begins a new step."""
+_NAMED = (Layer.TRUTH, Layer.ESTIMATE, Layer.PHONE)
+"""Whose colours have words in `palette.Cameras.words`."""
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
 
 
@@ -44,9 +47,15 @@ class LayerPanel:
         self._puller: object = None
         self._boxes = {}
         for layer in Layer:
-            box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=HINTS[layer])
+            box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=_hint(layer, USUAL))
             widgets.on_user(box, partial(_show, dispatch, layer))
             self._boxes[layer] = box
+        self._safe = gui.add_checkbox(
+            "Colours for colour-blind eyes",
+            False,
+            hint="Ground truth blue, estimates orange, methods likewise; in all browsers, kept for the next time.",
+        )
+        widgets.on_user(self._safe, lambda event: dispatch(UseSafeColors(bool(event.target.value))))
         self._note = gui.add_html("")
         with gui.add_folder("Tint", expand_by_default=False):
             self._which = gui.add_dropdown(
@@ -69,8 +78,14 @@ class LayerPanel:
         """Show the state's layers."""
         for layer, box in self._boxes.items():
             widgets.set_value(box, state.layers.is_visible(layer))
+            widgets.set_property(box, "hint", _hint(layer, state.cameras))
+        widgets.set_value(self._safe, state.layers.are_colors_safe)
         facts = "<br>".join(widgets.text(fact) for fact in self._facts(state))
         widgets.set_content(self._note, widgets.box(facts) if facts else "")
+
+
+def _hint(layer: Layer, cameras: Cameras) -> str:
+    return HINTS[layer].format(*(word for named, word in zip(_NAMED, cameras.words, strict=True) if named is layer))
 
 
 def _show(dispatch: Callable[[Action], None], layer: Layer, event: Any) -> None:

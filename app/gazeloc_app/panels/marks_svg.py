@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gazeloc_app import widgets
+from gazeloc_app import palette, widgets
 from gazeloc_app.frames.frame_marks import Line, Mark
 from gazeloc_core.camera import Camera
 
-CLICKED, EXPECTED, SELECTED = "#ff7800", "#00c8ff", "#ff00c8"
+CLICKED, EXPECTED, SELECTED = (palette.hexadecimal(c) for c in (palette.SCAN_SIDE, palette.SFM_SIDE, palette.SELECTED))
 
 
 def marks_svg(

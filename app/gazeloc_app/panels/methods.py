@@ -15,7 +15,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
-from gazeloc_app.scene_cameras import METHOD_COLORS, RED
+from gazeloc_app.palette import hexadecimal
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
 from gazeloc_core.methods import Method
@@ -49,7 +49,13 @@ class MethodPanel:
         """Show the state's methods."""
         self._state = state
         widgets.set_property(self._run, "disabled", state.has_job(f"Run {state.annotation.method}"))
-        seen = (state.recording, state.annotation.method, state.annotation.alignment, state.data_revision)
+        seen = (
+            state.recording,
+            state.annotation.method,
+            state.annotation.alignment,
+            state.data_revision,
+            state.cameras,
+        )
         if seen != self._seen:
             self._seen = seen
             method = state.annotation.method
@@ -65,8 +71,8 @@ class MethodPanel:
         rows = []
         for method in Method:
             trajectory = self._trajectory(state, method)
-            color = RED if method is state.annotation.method else METHOD_COLORS[method]
-            name = widgets.colored("■", "rgb({},{},{})".format(*color)) + f" {widgets.text(method.value)}"
+            color = state.cameras.estimate if method is state.annotation.method else state.cameras.methods[method]
+            name = widgets.colored("■", hexadecimal(color)) + f" {widgets.text(method.value)}"
             if trajectory is None:
                 rows.append([name, widgets.colored("not run", widgets.MUTED), "", "", ""])
             else:

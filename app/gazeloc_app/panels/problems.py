@@ -14,7 +14,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import FrameErrors, ProjectData
 from gazeloc_app.frames.problems import FrameTable, Problem, worst_first
-from gazeloc_app.frames.timeline_html import MARK_COLORS, MARK_SIGNS
+from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.panels.playing import table_of
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
@@ -110,7 +110,7 @@ def _row(state: AppState, table: FrameTable, errors: FrameErrors | None, frame: 
         facts.append("no pose")
     found = state.annotation.marks.get(frame)
     if found is not None:
-        facts.append(widgets.colored(f"{MARK_SIGNS[found.mark]} {found.mark}", MARK_COLORS[found.mark]))
+        facts.append(widgets.colored(f"{MARK_SIGNS[found.mark]} {found.mark}", widgets.MARK_COLORS[found.mark]))
         facts.append(widgets.text(found.note))
     url = widgets.text(f"/show/{quote(state.recording)}/{frame}")
     picture = widgets.text(f"/thumbnails/{quote(state.recording)}/{frame}.jpg?rev=1")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from gazeloc_app.palette import POINTS
 from gazeloc_app.scene.placing import place
 from gazeloc_core.arrays import Bytes, Floats, Ints
 from gazeloc_core.even_sample import even_sample
@@ -50,7 +51,7 @@ class CloudLayer:
         self._handle = self._scene.add_point_cloud(
             self._name,
             np.asarray(points_in_sfm[self._rows], dtype=np.float32),
-            np.array(colors[self._rows] if tint is None and colors is not None else tint or (90, 160, 220), np.uint8),
+            np.array(colors[self._rows] if tint is None and colors is not None else tint or POINTS, np.uint8),
             point_size=self._point_size_m / self._scan_from_sfm.scale,
             point_shape="circle",
             point_shading="flat",

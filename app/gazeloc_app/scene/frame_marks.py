@@ -8,14 +8,12 @@ import numpy as np
 import viser
 
 from gazeloc_app.frames.frame_marks import Line, Mark
+from gazeloc_app.palette import SCAN_SIDE, SELECTED, SFM_SIDE
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_core.arrays import Floats
-from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoint_views import View
 
-CLICKED: Rgb = (255, 120, 0)
-EXPECTED: Rgb = (0, 200, 255)
-SELECTED: Rgb = (255, 0, 200)
+CLICKED, EXPECTED = SCAN_SIDE, SFM_SIDE
 _BEFORE_PICTURE = 0.995
 """Share of the picture's distance at which marks stand, so that it does not cover them."""
 _ARM = 0.014

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_app.palette import SHOWN_FRAME
 from gazeloc_app.scene.placing import pose_arguments
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
@@ -20,7 +21,7 @@ PLANE_M = 0.5
 class SelectedFrameLayer:
     """The frame that is looked at, as one real frustum with its picture, at `/selected`."""
 
-    def __init__(self, scene: viser.SceneApi, color: Rgb = (255, 200, 0), depth_m: float = 0.3):
+    def __init__(self, scene: viser.SceneApi, color: Rgb = SHOWN_FRAME, depth_m: float = 0.3):
         self._scene = scene
         self._color = color
         self._depth_m = depth_m

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from gazeloc_app.palette import GAZE
 from gazeloc_app.scene.placing import NodeGroup
 from gazeloc_core.arrays import Floats
-from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import Point
 
-RAY: Rgb = (230, 60, 200)
 _MISS_LENGTH_M = 5.0
 _HIT_RADIUS_M = 0.035
 
@@ -43,14 +42,14 @@ class GazeLayer:
 
     def _make_ray(self, name: str, ends: tuple[Point, Point]) -> viser.LineSegmentsHandle:
         return self._scene.add_line_segments(
-            name, np.array([ends]), np.array(RAY), thickness=3.0, thickness_units="screen"
+            name, np.array([ends]), np.array(GAZE), thickness=3.0, thickness_units="screen"
         )
 
     def _make_hit(self, name: str, point: Point) -> viser.IcosphereHandle:
         return self._scene.add_icosphere(
             name,
             radius=_HIT_RADIUS_M,
-            color=RAY,
+            color=GAZE,
             opacity=0.8,
             position=np.array(point),
             cast_shadow=False,

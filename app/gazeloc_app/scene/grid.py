@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from gazeloc_app.palette import AXES, GROUND
 from gazeloc_core.arrays import Bytes, Floats
-from gazeloc_core.glb import Rgb, lines_glb
+from gazeloc_core.glb import lines_glb
 from gazeloc_core.viewpoint import up_vector
 
-GROUND: Rgb = (150, 158, 168)
-AXES: tuple[Rgb, ...] = ((213, 94, 0), (0, 158, 115), (0, 114, 178))
 """Of x, y and z; colour-blind eyes tell them apart."""
 _ABOVE_FLOOR_M = 0.005
 """So that the lines are not half in the floor."""

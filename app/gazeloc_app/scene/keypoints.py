@@ -10,15 +10,11 @@ import numpy as np
 import viser
 
 from gazeloc_app.actions.picks import Side
+from gazeloc_app.palette import DISABLED, RESIDUAL, SCAN_SIDE, SELECTED, SFM_SIDE
 from gazeloc_app.scene.placing import NodeGroup
 from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Point
 from gazeloc_core.transforms import Similarity
-
-SCAN_SIDE: Rgb = (255, 120, 0)
-SFM_SIDE: Rgb = (0, 160, 220)
-DISABLED: Rgb = (140, 140, 140)
-SELECTED: Rgb = (255, 0, 200)
 
 
 @dataclass(frozen=True)
@@ -73,7 +69,7 @@ class KeypointsLayer:
             if drawn:
                 labels[f"{base}/label"] = _Label(next(iter(drawn.values())), pair.name)
             if len(drawn) == 2:
-                color = SELECTED if pair.key == selected else (220, 30, 40) if pair.enabled else DISABLED
+                color = SELECTED if pair.key == selected else RESIDUAL if pair.enabled else DISABLED
                 residuals[f"{base}/residual"] = _Residual(drawn["scan"], drawn["sfm"], color)
         self._markers.show(markers)
         self._labels.show(labels)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from gazeloc_core.glb import Rgb
+from gazeloc_app.palette import SELECTED
 from gazeloc_core.keypoints import Point
 
-COLOR: Rgb = (255, 0, 200)
 RADIUS_M = 0.05
 
 
@@ -34,7 +33,7 @@ class SuggestionLayer:
             ball = self._scene.add_icosphere(
                 "/suggestion/ball",
                 radius=RADIUS_M,
-                color=COLOR,
+                color=SELECTED,
                 opacity=0.4,
                 subdivisions=3,
                 position=at,

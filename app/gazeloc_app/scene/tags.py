@@ -10,9 +10,6 @@ from gazeloc_core.glb import Rgb, lines_glb
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 
-SCAN_TAGS: Rgb = (240, 140, 0)
-SFM_TAGS: Rgb = (0, 170, 190)
-
 
 class TagsLayer:
     """The tags of one side at `/tags/<name>`; `show` takes them in their own frame and the similarity into the scan."""

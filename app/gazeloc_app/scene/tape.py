@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from gazeloc_app.palette import TAPE
 from gazeloc_app.scene.placing import NodeGroup
 from gazeloc_core.arrays import Floats
-from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import Point
 
-COLOR: Rgb = (0, 190, 235)
 _END_RADIUS_M = 0.015
 
 
@@ -39,7 +38,7 @@ class TapeLayer:
         return self._scene.add_icosphere(
             name,
             radius=_END_RADIUS_M,
-            color=COLOR,
+            color=TAPE,
             position=np.array(point),
             cast_shadow=False,
             receive_shadow=False,
@@ -47,7 +46,7 @@ class TapeLayer:
 
     def _make_line(self, name: str, ends: tuple[Point, Point]) -> viser.LineSegmentsHandle:
         return self._scene.add_line_segments(
-            name, np.array([ends]), np.array(COLOR), thickness=3.0, thickness_units="screen"
+            name, np.array([ends]), np.array(TAPE), thickness=3.0, thickness_units="screen"
         )
 
     def _make_length(self, name: str, spec: tuple[Point, str]) -> viser.LabelHandle:

@@ -1,0 +1,62 @@
+"""What one user wants in every project: ~/.config/gazeloc/settings.json (or under XDG_CONFIG_HOME)."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from gazeloc_app.state import AppState
+from gazeloc_core.errors import GazelocError
+from gazeloc_core.files import write_json_atomically
+from gazeloc_core.user_files import read_json_object
+
+_SAFE_COLORS = "safe_colors"
+_log = logging.getLogger(__name__)
+
+
+def settings_path() -> Path:
+    """Where the settings are, whether or not there are any."""
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "gazeloc" / "settings.json"
+
+
+class UserSettings:
+    """Puts the user's settings into the state at the start, and writes them when they change."""
+
+    def __init__(self, say: Callable[[str], None] = _log.warning):
+        """`say` is told of a file that cannot be read; everything is as usual then."""
+        self._say = say
+
+    def put_into(self, state: AppState) -> AppState:
+        """The state with the user's settings."""
+        return replace(state, layers=replace(state.layers, are_colors_safe=self._read()))
+
+    def save(self, before: AppState, after: AppState) -> None:
+        """Write them where they changed.
+
+        Raises:
+            GazelocError: if that fails.
+        """
+        is_on = after.layers.are_colors_safe
+        if is_on == before.layers.are_colors_safe:
+            return
+        path = settings_path()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_json_atomically(path, {_SAFE_COLORS: is_on})
+        except OSError as error:
+            raise GazelocError(
+                f"{path}: your choice of colours could not be kept ({error.strerror}); it is lost with this run."
+            ) from error
+
+    def _read(self) -> bool:
+        path = settings_path()
+        if not path.exists():
+            return False
+        try:
+            return read_json_object(path).get(_SAFE_COLORS) is True
+        except GazelocError as error:
+            self._say(f"{error} The usual colours are shown.")
+            return False
