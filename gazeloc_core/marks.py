@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
+from gazeloc_core.arrays import Bools
 from gazeloc_core.errors import InputError
 
 MAX_NOTE = 500
@@ -52,6 +55,12 @@ class FrameMarks:
     def remove(self, frame_index: int) -> FrameMarks:
         """With a frame's mark taken away."""
         return FrameMarks(tuple(mark for mark in self.marks if mark.frame_index != frame_index))
+
+    def have(self, mark: Mark, count: int) -> Bools:
+        """Which of `count` frames have this mark, (count,)."""
+        found = np.zeros(count, dtype=np.bool_)
+        found[[one.frame_index for one in self.marks if one.mark is mark and one.frame_index < count]] = True
+        return found
 
     def counts(self) -> dict[Mark, int]:
         """How many frames have each mark."""

@@ -4,13 +4,17 @@ what is said of arguments that are none.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import io
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
+
+from gazeloc_core.errors import InputError
 
 TAG_SIZE_HELP = """Metres between the corners that the detector reports. For tag36h11 and its kin that is the outer \
 edge of the black square, for the tagStandard and tagCircle families the *inner* square, not the printed edge \
@@ -60,7 +64,30 @@ def deferred(command: Callable[..., None]) -> Callable[..., Command]:
     return bind
 
 
-def in_one_line(box: str, arguments: list[str], commands: Collection[str]) -> str:
+def parsed(arguments: list[str], commands: Mapping[str, Any], version: str) -> Command:
+    """The one of the `commands` that the arguments name.
+
+    Raises:
+        InputError: if they are none, in one line instead of tyro's box.
+    """
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            command: Command = tyro.extras.subcommand_cli_from_dict(
+                dict(commands),
+                prog="gazeloc",
+                description="Where in the room did this person look? Registers eye-tracking glasses onto a room scan. "
+                f"This is version {version}; `gazeloc COMMAND --help` explains a command.",
+                args=arguments,
+            )
+    except SystemExit as stop:
+        if stop.code:
+            raise InputError(_in_one_line(said.getvalue(), arguments, commands)) from None
+        raise
+    return command
+
+
+def _in_one_line(box: str, arguments: list[str], commands: Collection[str]) -> str:
     """What a box of tyro's says up to its first rule, and where there is help."""
     rows = [re.sub(r"\x1b\[[0-9;]*m", "", row).strip("│ ") for row in box.splitlines()]
     rows = [row for row in rows if row and row[0] not in "╭╰"]

@@ -10,8 +10,6 @@ command imported and run.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import sys
 from pathlib import Path
@@ -22,7 +20,6 @@ import tyro
 from gazeloc_app.arguments import (
     AllowedHosts,
     Between,
-    Command,
     Flag,
     OptionalName,
     OptionalPath,
@@ -30,11 +27,11 @@ from gazeloc_app.arguments import (
     Project,
     TagSize,
     deferred,
-    in_one_line,
+    parsed,
 )
 from gazeloc_app.door.address import check_address
 from gazeloc_core import __version__
-from gazeloc_core.errors import Cancelled, GazelocError, InputError
+from gazeloc_core.errors import Cancelled, GazelocError
 
 
 @deferred
@@ -160,7 +157,12 @@ def status(project: Project, *, json: Flag = False) -> None:
 
 @deferred
 def evaluate(
-    project: Project, *, truth: OptionalPath = None, recording: OptionalName = None, json: Flag = False
+    project: Project,
+    *,
+    truth: OptionalPath = None,
+    recording: OptionalName = None,
+    without_bad: Flag = False,
+    json: Flag = False,
 ) -> None:
     """Compare the estimated poses with the ground truth. Nothing is aligned to the truth first.
 
@@ -171,11 +173,12 @@ def evaluate(
         project: The project folder.
         truth: TUM lines of scan_from_camera with the recording's own timestamps; by default what the project names.
         recording: Only this recording; by default all that have a truth.
+        without_bad: Leave out the frames that people marked bad.
         json: Print one JSON object instead of a table.
     """
     from gazeloc_app import commands
 
-    commands.evaluate(project, truth=truth, recording=recording, as_json=json)
+    commands.evaluate(project, truth=truth, recording=recording, without_bad=without_bad, as_json=json)
 
 
 @deferred
@@ -362,7 +365,7 @@ def main(arguments: list[str] | None = None) -> None:
         if arguments == ["--version"]:
             print(f"gazeloc {__version__}")
             return
-        _parsed(arguments)()
+        parsed(arguments, COMMANDS, __version__)()
         sys.stdout.flush()
     except Cancelled:
         sys.exit(130)
@@ -375,26 +378,3 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # `gazeloc ... | head`: nobody reads on
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
-
-
-def _parsed(arguments: list[str]) -> Command:
-    """The command that the arguments name.
-
-    Raises:
-        InputError: if they are none, in one line instead of tyro's box.
-    """
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(said):
-            command: Command = tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="gazeloc",
-                description="Where in the room did this person look? Registers eye-tracking glasses onto a room scan. "
-                f"This is version {__version__}; `gazeloc COMMAND --help` explains a command.",
-                args=arguments,
-            )
-    except SystemExit as stop:
-        if stop.code:
-            raise InputError(in_one_line(said.getvalue(), arguments, COMMANDS)) from None
-        raise
-    return command

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from gazeloc_app.terminal import progress_bar, table
 from gazeloc_core import pipeline
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.evaluate import Evaluation
+from gazeloc_core.evaluate import StatusErrors
 from gazeloc_core.methods import method_named
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
 from gazeloc_core.protocol import ProtocolOptions, make_protocol_project
@@ -103,10 +104,10 @@ def status(folder: Path, *, as_json: bool) -> None:
     print(table(["of", "method", "stage", "state", ""], rows))
 
 
-def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json: bool) -> None:
+def evaluate(folder: Path, *, truth: Path | None, recording: str | None, without_bad: bool, as_json: bool) -> None:
     """Print the errors against the truth, in centimetres and degrees or as JSON in metres and degrees."""
     project = Project.open(folder)
-    found = pipeline.evaluate_project(project, truth=truth, recording=recording)
+    found = pipeline.evaluate_project(project, truth=truth, recording=recording, without_bad=without_bad)
     if as_json:
         value = {name: {method: e.to_json() for method, e in methods.items()} for name, methods in found.items()}
         print(json.dumps(value, indent=1, allow_nan=False))
@@ -135,21 +136,26 @@ def evaluate(folder: Path, *, truth: Path | None, recording: str | None, as_json
         for name, method, e in each
     ]
     print(f"\n{table(head, rows)}")
-    print(f"\n{_table_by_status(each)}")
+    print(f"\n{_table_by_kind([(name, method, e.by_status) for name, method, e in each])}")
+    if any(e.by_mark for *_, e in each):
+        print(f"\n{_table_by_kind([(name, method, e.by_mark) for name, method, e in each])}")
+    for name, method, e in each:
+        if e.left_out:
+            print(f"{name}, {method}: left out are {e.left_out} marked bad, but for the table of marks.")
 
 
-def _table_by_status(each: Sequence[tuple[str, str, Evaluation]]) -> str:
-    """All frames, keyframes or not, by how they came by their pose."""
+def _table_by_kind(each: Sequence[tuple[str, str, Mapping[Any, StatusErrors]]]) -> str:
+    """All frames, keyframes or not, by how they came by their pose or by their mark."""
     head = ["recording", "method", "all frames", "with truth"]
     head += [f"{what} {unit}" for unit in ("cm", "°") for what in ("mean", "p95", "max")]
     rows = [
         [
-            *(name, method, status.value.replace("_", " "), str(errors.frames)),
+            *(name, method, kind.value.replace("_", " "), str(errors.frames)),
             *_cells(errors.position_m, ("mean", "p95", "max"), 100),
             *_cells(errors.rotation_deg, ("mean", "p95", "max")),
         ]
-        for name, method, e in each
-        for status, errors in e.by_status.items()
+        for name, method, by_kind in each
+        for kind, errors in by_kind.items()
     ]
     return table(head, rows)
 

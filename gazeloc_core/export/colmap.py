@@ -1,7 +1,12 @@
-"""The reconstruction as a COLMAP model in the scan's coordinates: metres, the scan's own axes and origin."""
+"""The reconstruction as a COLMAP model in the scan's coordinates: metres, the scan's own axes and origin.
+
+COLMAP's files have no place for what people said about a frame, so that is in a table beside them.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,18 +17,22 @@ from gazeloc_core.arrays import Ints
 from gazeloc_core.colmap_io import write_model
 from gazeloc_core.errors import InputError
 from gazeloc_core.export.files import move_all, staging_folder
+from gazeloc_core.frame_notes import COLUMNS, FrameNotes
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
 
 MARKER = "gazeloc.txt"
+NOTES_FILE = "frames.csv"
 MARKER_TEXT = (
     "Written by GazeLoc: a COLMAP model in scan coordinates (metres). Its folder is replaced by later exports.\n"
 )
 
 
-def write_colmap(placed: Sequence[PlacedModel], folder: Path, *, overwrite: bool = False) -> list[Path]:
+def write_colmap(
+    placed: Sequence[PlacedModel], folder: Path, *, notes: FrameNotes | None = None, overwrite: bool = False
+) -> list[Path]:
     """Write cameras, images and points of a reconstruction's pieces, mapped into the scan, to `folder`; the files.
 
-    An image that is in two pieces is written with its pose in the first.
+    An image that is in two pieces is written with its pose in the first. `notes` go into `frames.csv`, by image.
 
     Raises:
         InputError: if the folder holds files that GazeLoc did not write, or cannot be written.
@@ -51,7 +60,22 @@ def write_colmap(placed: Sequence[PlacedModel], folder: Path, *, overwrite: bool
             np.concatenate([model.point_colors for model in models]),
         )
         (staging / MARKER).write_text(MARKER_TEXT, encoding="utf-8")
+        if notes is not None:
+            table = _notes_table(models, rows, notes)
+            (staging / NOTES_FILE).write_text(table, encoding="utf-8", newline="\n")
         return move_all(staging, folder)
+
+
+def _notes_table(models: Sequence[SfmModel], rows: Sequence[Ints], notes: FrameNotes) -> str:
+    """A row of every image that is written, with its frame in the recording and what is known of that."""
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["image name", "frame index", *COLUMNS])
+    for model, row in zip(models, rows, strict=True):
+        for i in row.tolist():
+            frame = int(model.frame_indices[i])
+            table.writerow([model.image_names[i], str(frame), *notes.cells(frame)])
+    return text.getvalue()
 
 
 def _new_images(model: SfmModel, before: Sequence[PlacedModel]) -> Ints:

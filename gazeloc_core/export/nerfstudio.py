@@ -20,7 +20,7 @@ from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GeometryError, InputError
 from gazeloc_core.export.files import move_all, refuse_foreign, staging_folder
-from gazeloc_core.marks import FrameMarks
+from gazeloc_core.frame_notes import FrameNotes
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
@@ -43,14 +43,14 @@ def write_nerfstudio(
     *,
     undistorted: Iterable[tuple[int, Bytes]] | None = None,
     file_paths: Mapping[int, str] | None = None,
-    marks: FrameMarks | None = None,
+    notes: FrameNotes | None = None,
     overwrite: bool = False,
     report: Report = silent,
 ) -> list[Path]:
     """Write `folder`/transforms.json for `registered_frames`; the list of files written.
 
     `undistorted` gives their pictures (index, (H, W, 3) RGB of the camera `pinhole`), which are written to
-    `folder`/images. Without it, `file_paths` names pictures that are there already, by frame index. `marks` go beside
+    `folder`/images. Without it, `file_paths` names pictures that are there already, by frame index. `notes` go beside
     their frames, where other programs read over them.
 
     Raises:
@@ -71,7 +71,7 @@ def write_nerfstudio(
         if missing := [index for index in frames if index not in paths]:
             raise InputError(f"Frame {missing[0]} is registered but has no undistorted picture; undistort it first.")
         content = json.dumps(
-            _content(trajectory, frames, paths, pinhole, marks or FrameMarks()), indent=1, allow_nan=False
+            _content(trajectory, frames, paths, pinhole, notes or FrameNotes()), indent=1, allow_nan=False
         )
         (staging / FILE_NAME).write_text(content + "\n", encoding="utf-8")
         return move_all(staging, folder)
@@ -84,9 +84,8 @@ def gl_pose(trajectory: Trajectory, index: int) -> Floats:
 
 
 def _content(
-    trajectory: Trajectory, frames: list[int], paths: Mapping[int, str], pinhole: Camera, marks: FrameMarks
+    trajectory: Trajectory, frames: list[int], paths: Mapping[int, str], pinhole: Camera, notes: FrameNotes
 ) -> dict[str, Any]:
-    marked = {one.frame_index: {"mark": one.mark.value, "note": one.note} for one in marks.marks}
     (fx, fy), (cx, cy) = (values.tolist() for values in (pinhole.focal_px, pinhole.principal_point_px))
     return {
         "generator": GENERATOR,
@@ -107,7 +106,7 @@ def _content(
                 "transform_matrix": gl_pose(trajectory, index).tolist(),
                 "frame_index": index,
                 "timestamp_ns": int(trajectory.timestamp_ns[index]),
-                **marked.get(index, {}),
+                **notes.values(index),
             }
             for index in frames
         ],

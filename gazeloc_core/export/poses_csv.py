@@ -1,7 +1,8 @@
 """Aligned poses as CSV: one row for every frame of the recording, its pose empty where it has none.
 
 Poses are `scan_from_camera` (x right, y down, z forward): the translation is the camera centre on the scan in metres,
-the quaternion turns camera axes into scan axes. `mark` and `note` are what people said about the frame.
+the quaternion turns camera axes into scan axes. `mark` and `note` are what people said about the frame,
+`agreement` (0 to 1) how well it agrees with the scan seen from its pose.
 """
 
 from __future__ import annotations
@@ -11,23 +12,23 @@ import io
 from pathlib import Path
 
 from gazeloc_core.export.files import starts_with, write_text_export
-from gazeloc_core.marks import FrameMarks
+from gazeloc_core.frame_notes import COLUMNS, FrameNotes
 from gazeloc_core.trajectory import Trajectory
 
 _POSES_HEADER = "timestamp [ns],frame index,status,tx [m],ty [m],tz [m],qw,qx,qy,qz"
 """Files of earlier versions have these columns alone."""
-HEADER = f"{_POSES_HEADER},mark,note"
+HEADER = ",".join([_POSES_HEADER, *COLUMNS])
 
 
 def write_poses_csv(
-    trajectory: Trajectory, path: Path, *, marks: FrameMarks | None = None, overwrite: bool = False
+    trajectory: Trajectory, path: Path, *, notes: FrameNotes | None = None, overwrite: bool = False
 ) -> list[Path]:
     """Write `path`; the list of files written.
 
     Raises:
         InputError: if a file is there that GazeLoc did not write, or the folder cannot be written.
     """
-    by_frame = {mark.frame_index: (mark.mark.value, mark.note) for mark in (marks or FrameMarks()).marks}
+    notes = notes or FrameNotes()
     text = io.StringIO()
     text.write(f"{HEADER}\n")
     rows = csv.writer(text, lineterminator="\n")
@@ -35,6 +36,6 @@ def write_poses_csv(
         pose = [""] * 7
         if has_pose:
             pose = [f"{value:.9f}" for value in (*trajectory.centers[index], *trajectory.wxyz[index])]
-        mark = by_frame.get(index, ("", ""))
-        rows.writerow([str(trajectory.timestamp_ns[index]), str(index), str(trajectory.status[index]), *pose, *mark])
+        start = [str(trajectory.timestamp_ns[index]), str(index), str(trajectory.status[index])]
+        rows.writerow([*start, *pose, *notes.cells(index)])
     return [write_text_export(path, text.getvalue(), starts_with(_POSES_HEADER), overwrite=overwrite)]

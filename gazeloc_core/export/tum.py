@@ -1,7 +1,8 @@
 """Aligned poses as a TUM trajectory: `timestamp tx ty tz qx qy qz qw`, seconds and metres, `scan_from_camera`.
 
 The format is that of the TUM RGB-D benchmark (Sturm et al., IROS 2012), which evo and most SLAM tools read. Seconds
-are written digit by digit from the integer nanoseconds: a double cannot hold a Unix time to the nanosecond.
+are written digit by digit from the integer nanoseconds: a double cannot hold a Unix time to the nanosecond. What people
+said about a frame is a comment before its line, which readers of the format pass over.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.export.files import starts_with, write_text_export
+from gazeloc_core.frame_notes import FrameNotes
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 HEADER = "# GazeLoc: scan_from_camera; timestamp tx ty tz qx qy qz qw"
@@ -32,7 +34,12 @@ def seconds_text(timestamp_ns: int) -> str:
 
 
 def write_tum(
-    trajectory: Trajectory, path: Path, options: TumOptions | None = None, *, overwrite: bool = False
+    trajectory: Trajectory,
+    path: Path,
+    options: TumOptions | None = None,
+    *,
+    notes: FrameNotes | None = None,
+    overwrite: bool = False,
 ) -> list[Path]:
     """Write the frames that have a pose to `path`; the list of files written.
 
@@ -42,8 +49,10 @@ def write_tum(
     wanted = trajectory.has_pose
     if options is not None and options.registered_only:
         wanted = wanted & (trajectory.status != PoseStatus.INTERPOLATED.value)
-    lines = [HEADER]
-    for index in np.flatnonzero(wanted):
+    notes, lines = notes or FrameNotes(), [HEADER]
+    for index in np.flatnonzero(wanted).tolist():
+        if said := notes.sentence(index):
+            lines.append(f"# frame {index} is {said}")
         w, x, y, z = trajectory.wxyz[index]
         values = " ".join(f"{value:.9f}" for value in (*trajectory.centers[index], x, y, z, w))
         lines.append(f"{seconds_text(int(trajectory.timestamp_ns[index]))} {values}")

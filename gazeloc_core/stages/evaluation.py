@@ -15,9 +15,16 @@ from gazeloc_core.user_files import about
 
 
 def evaluate_recording(
-    project: Project, recording: str, truth: Path | None = None, method: Method = Method.SFM
+    project: Project,
+    recording: str,
+    truth: Path | None = None,
+    method: Method = Method.SFM,
+    *,
+    without_bad: bool = False,
 ) -> Evaluation:
     """The errors of a recording's trajectory against a truth file; by default the one that the project names.
+
+    `without_bad` leaves out the frames that people marked bad.
 
     Raises:
         InputError: if there is no truth file, or its times are not the recording's.
@@ -29,11 +36,11 @@ def evaluate_recording(
     timestamp_ns, poses = read_tum(path)
     trajectory = fresh_trajectory(project, recording, method)
     with about(path):
-        return evaluate(trajectory, timestamp_ns, poses)
+        return evaluate(trajectory, timestamp_ns, poses, project.marks(recording), without_bad=without_bad)
 
 
 def evaluate_project(
-    project: Project, *, truth: Path | None = None, recording: str | None = None
+    project: Project, *, truth: Path | None = None, recording: str | None = None, without_bad: bool = False
 ) -> dict[str, dict[Method, Evaluation]]:
     """The errors of each recording and method that has fresh poses; of those that have a truth, or of the one named.
 
@@ -49,7 +56,10 @@ def evaluate_project(
     if not names:
         raise InputError(f"{project.folder}: no recording has a ground truth; give one with --truth FILE.tum.")
     return {
-        name: {method: evaluate_recording(project, name, truth, method) for method in _evaluated(project, name)}
+        name: {
+            method: evaluate_recording(project, name, truth, method, without_bad=without_bad)
+            for method in _evaluated(project, name)
+        }
         for name in names
     }
 

@@ -15,12 +15,14 @@ from gazeloc_core.export.gaze3d_csv import write_gaze3d_csv
 from gazeloc_core.export.nerfstudio import registered_frames, write_nerfstudio
 from gazeloc_core.export.poses_csv import write_poses_csv
 from gazeloc_core.export.tum import write_tum
+from gazeloc_core.frame_notes import FrameNotes
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.gaze import gaze_inputs
 from gazeloc_core.stages.poses import fresh_trajectory, placed_models
+from gazeloc_core.stages.scores import fresh_scores
 from gazeloc_core.undistort import Undistorter
 
 
@@ -63,7 +65,7 @@ def _csv(project: Project, recording: str, method: Method, folder: Path, report:
     state, reason = gaze.state(gaze_inputs(project, recording, method))
     if state is not State.FRESH:
         raise ProjectError(f"{recording}: the gaze is {state.value} ({reason}); run `gazeloc run` first.")
-    files = write_poses_csv(trajectory, folder / "poses.csv", marks=project.marks(recording))
+    files = write_poses_csv(trajectory, folder / "poses.csv", notes=_notes(project, recording, method))
     if gaze.header().stats["samples"]:
         report(0.5, "writing gaze3d.csv")
         files += write_gaze3d_csv(inputs.load_gaze(gaze.read_arrays()), folder / "gaze3d.csv")
@@ -72,7 +74,8 @@ def _csv(project: Project, recording: str, method: Method, folder: Path, report:
 
 def _tum(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
     report(0.1, "writing poses.tum")
-    return write_tum(fresh_trajectory(project, recording, method), folder / "poses.tum")
+    trajectory, notes = fresh_trajectory(project, recording, method), _notes(project, recording, method)
+    return write_tum(trajectory, folder / "poses.tum", notes=notes)
 
 
 def _colmap(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
@@ -83,7 +86,7 @@ def _colmap(project: Project, recording: str, method: Method, folder: Path, repo
             "nerfstudio, or a method that does."
         )
     fresh_trajectory(project, recording, method)
-    return write_colmap(placed_models(project, recording, method), folder)
+    return write_colmap(placed_models(project, recording, method), folder, notes=_notes(project, recording, method))
 
 
 def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
@@ -96,8 +99,14 @@ def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, 
         for index, rgb in opened.frames.iterate(np.array(wanted, dtype=np.int64).tolist()):
             yield index, undistorter.image(rgb)
 
-    marks = project.marks(recording)
-    return write_nerfstudio(trajectory, undistorter.target, folder, undistorted=pictures(), marks=marks, report=report)
+    notes = _notes(project, recording, method)
+    return write_nerfstudio(trajectory, undistorter.target, folder, undistorted=pictures(), notes=notes, report=report)
+
+
+def _notes(project: Project, recording: str, method: Method) -> FrameNotes:
+    """People's marks, and the scores of these very poses where there are any."""
+    scores = fresh_scores(project, recording, method)
+    return FrameNotes(project.marks(recording), None if scores is None else scores.score)
 
 
 FORMATS: dict[str, Callable[[Project, str, Method, Path, Report], list[Path]]] = {

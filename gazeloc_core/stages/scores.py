@@ -15,7 +15,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.agreement import AgreementOptions, FrameScorer
 from gazeloc_core.arrays import Bools, Floats, Ints
-from gazeloc_core.artifacts import Artifact
+from gazeloc_core.artifacts import Artifact, State
 from gazeloc_core.errors import ProjectError
 from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.methods import Method
@@ -150,6 +150,14 @@ def load_scores(artifact: Artifact, count: int) -> FrameScores:
     if any(arrays.get(name, np.zeros(0)).shape != (count,) for name in COLUMNS):
         raise ProjectError(f"{artifact.folder}: the scores are not of {count} frames; remove it and score again.")
     return FrameScores(**{name: arrays[name] for name in COLUMNS})
+
+
+def fresh_scores(project: Project, recording: str, method: Method) -> FrameScores | None:
+    """The scores of a method's poses as these are now; None where there are none."""
+    artifact = project.result(recording, method, "scores")
+    if artifact.state(score_inputs(project, recording, method))[0] is not State.FRESH:
+        return None
+    return load_scores(artifact, int(project.result(recording, method, "trajectory").header().stats["frames"]))
 
 
 def _stats(scores: FrameScores, has_pose: Bools) -> Mapping[str, float | int]:

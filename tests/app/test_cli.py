@@ -20,6 +20,7 @@ from tiny_captures import write_scan
 
 from gazeloc_core import __version__, pipeline
 from gazeloc_core.marks import FrameMark, FrameMarks, Mark
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.stages.registration import align_keypoints
 
@@ -29,7 +30,7 @@ OPTIONS = {
     "run": ["--method", "--recording"],
     "view": ["--port"],
     "status": ["--json"],
-    "evaluate": ["--truth", "--recording", "--json"],
+    "evaluate": ["--truth", "--recording", "--without-bad", "--json"],
     "score": ["--method", "--recording", "--worst", "--json"],
     "protocol": ["--scan", "--every", "--share", "--seed", "--tag-family", "--tag-size"],
     "export": ["--format", "--output"],
@@ -169,6 +170,21 @@ def test_evaluate_prints_errors_and_then_errors_along_the_path(capsys, home: Pat
         ["walk", "sfm", "registered", "2"],
         ["walk", "sfm", "interpolated", "5"],
     ]
+
+
+def test_evaluate_leaves_out_what_people_marked_bad(capsys, project: Project):
+    align_keypoints(project, "walk")
+    pipeline.run_after_choice(project, "walk", Method.SFM)
+    assert "bad" not in answer(capsys, "evaluate", project.folder)
+    project.save_marks("walk", FrameMarks().put(FrameMark(4, Mark.BAD)).put(FrameMark(5, Mark.GOOD)))
+    words = ["evaluate", project.folder, "--without-bad"]
+    said = answer(capsys, *words)
+    assert "walk, sfm: left out are 1 marked bad" in said
+    rows = [line.split() for line in said.splitlines()]
+    assert [row[2:4] for row in rows if row[2:3] in (["bad"], ["good"])] == [["good", "1"], ["bad", "1"]]
+    found = json.loads(answer(capsys, *words, "--json"))["walk"]["sfm"]
+    assert (found["left_out"], found["keyframes"]) == (1, 7)
+    assert "left out" not in answer(capsys, "evaluate", project.folder)
 
 
 def test_evaluate_takes_a_truth_of_its_own(capsys, home: Path):

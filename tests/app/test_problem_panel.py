@@ -66,4 +66,6 @@ def test_the_list_has_what_people_marked_with_their_notes_escaped(app):
     assert "Frame 5" in choose(app, Which.GOOD)
     assert "Frame 5" not in choose(app, Which.BAD)
     assert "Frame 15" in choose(app, Which.NO_POSE)
-    assert "1 good, 1 bad, 0 unsure" in panel(app)._summary.content
+    rows = app.data.errors("walk", app.data.poses_key("walk", app.store.state.annotation)).position_m
+    good, bad = (f"mean error {100 * rows[frame]:.1f} cm" for frame in (5, 3))
+    assert f"1 good ({good}), 1 bad ({bad}), 0 unsure" in panel(app)._summary.content

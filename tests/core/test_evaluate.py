@@ -119,7 +119,7 @@ def test_json_is_strict_and_null_means_infinite():
     evaluation = evaluate(trajectory_of(["none"] * 20, range(20)), TIMES, camera_poses(20))
     value = json.loads(json.dumps(evaluation.to_json(), allow_nan=False))
     first_keys = ["frames", "keyframes", "registered", "without_truth", "rotation_deg", "position_m"]
-    assert list(value) == [*first_keys, "outliers", "ate_m", "rpe", "by_status"]
+    assert list(value) == [*first_keys, "outliers", "ate_m", "rpe", "by_status", "by_mark", "left_out"]
     assert value["by_status"] == {}
     assert value["registered"] == 0
     assert value["position_m"] == dict.fromkeys(["mean", "median", "p75", "p90", "p95", "max"])

@@ -18,6 +18,7 @@ from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.panels.playing import table_of
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
+from gazeloc_core.evaluate import errors_by_mark
 from gazeloc_core.marks import FrameMarks, Mark
 
 _MOST = 40
@@ -69,7 +70,7 @@ class ProblemPanel:
             return
         table = table_of(self._data, state)
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
-        widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks)))
+        widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks, errors)))
         frames = self._frames(table, state.annotation.marks)
         rows = "".join(_row(state, table, errors, frame) for frame in frames[:_MOST])
         if len(frames) > _MOST:
@@ -92,11 +93,15 @@ class ProblemPanel:
             self._dispatch(StartJob("Score the frames", tasks.score_frames, keywords))
 
 
-def _summary_html(table: FrameTable, marks: FrameMarks) -> str:
+def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | None) -> str:
     known = table.score[np.isfinite(table.score)]
     scored = f"{len(known)} frames are scored, the median is {np.median(known):.2f}." if len(known) else _FIRST
     counts = [f"{int((table.problem == kind.value).sum())} {kind.value}" for kind in Problem if kind.value]
-    marked = [f"{count} {mark.value}" for mark, count in marks.counts().items()]
+    found = {} if errors is None else errors_by_mark(marks, errors.rotation_deg, errors.position_m)
+    marked = [
+        f"{count} {mark.value}" + (f" (mean error {100 * found[mark].position_m.mean:.1f} cm)" if mark in found else "")
+        for mark, count in marks.counts().items()
+    ]
     return f"{widgets.text(scored)}<br>Problems: {', '.join(counts)}.<br>Marks: {', '.join(marked)}."
 
 
