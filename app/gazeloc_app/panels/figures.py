@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
-import plotly.graph_objects as go
 from viser import GuiApi
 
 from gazeloc_app import widgets
@@ -38,7 +38,9 @@ class FigurePanel:
         )
         self._which = gui.add_dropdown("Figure", (NONE,), hint="Which of the figures that were drawn shows.")
         self._notes = gui.add_html("")
-        self._plot = gui.add_plotly(go.Figure(), aspect=0.9, visible=False)
+        self._gui, self._place = gui, gui.add_folder(None)
+        self._plot: Any = None
+        """Made for the first figure: every page that opens takes a second to read the library that draws it."""
         widgets.on_user(self._draw, lambda _: self._start("Draw the figures", tasks.draw_figures), event="on_click")
         widgets.on_user(
             self._advise, lambda _: self._start("Draw which tags to print", tasks.draw_advice), event="on_click"
@@ -65,8 +67,14 @@ class FigurePanel:
     def _show(self, name: str) -> None:
         charts, _ = self._data.figures(self._recording) or ({}, ())
         chart = charts.get(name)
-        widgets.set_property(self._plot, "visible", chart is not None)
-        if chart is not None:
+        if self._plot is not None:
+            widgets.set_property(self._plot, "visible", chart is not None)
+        if chart is None:
+            return
+        if self._plot is None:
+            with self._place:
+                self._plot = self._gui.add_plotly(to_plotly(chart), aspect=0.9)
+        else:
             self._plot.figure = to_plotly(chart)
 
     def _start(self, name: str, task: Task) -> None:
