@@ -31,7 +31,8 @@ class EvidenceOptions:
     least_points: int = 25
     """So many points must agree with it."""
     least_share: float = 0.5
-    """And so large a share of the points from the earlier or of those from the later image."""
+    """And so large a share of the points from the earlier or of those from the later image, unless `least_points` from
+    each agree: two ways that meet in one pose did not go astray together."""
     grid: int = 4
     """The picture is cut into so many columns and rows."""
     least_cells: int = 5
@@ -69,7 +70,8 @@ def refusal(
     agrees = found.agrees
     sides = [agrees[is_from_before], agrees[~is_from_before]]
     share = max(float(side.mean()) for side in sides if len(side))
-    if agrees.sum() < options.least_points or share < options.least_share:
+    do_meet = min(int(side.sum()) for side in sides) >= options.least_points
+    if agrees.sum() < options.least_points or (share < options.least_share and not do_meet):
         return Refusal.FEW
     cells = np.floor(pixels[agrees] / [camera.width, camera.height] * options.grid).astype(np.int64)
     if len(np.unique(np.clip(cells, 0, options.grid - 1), axis=0)) < options.least_cells:

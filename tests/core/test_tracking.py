@@ -176,7 +176,8 @@ def frame_found(turned_deg=0.0, moved=0.0, agreeing=100, wide=True):
         (frame_found(moved=0.2), None),
         (frame_found(moved=0.5), Refusal.LEAP),
         (frame_found(agreeing=24), Refusal.FEW),
-        (frame_found(agreeing=40), Refusal.FEW),
+        (frame_found(agreeing=48), Refusal.FEW),
+        (frame_found(agreeing=52), None),  # less than half, but 26 from either side
         (frame_found(wide=False), Refusal.ONE_PLACE),
     ],
 )
