@@ -1,5 +1,8 @@
 """Another recording is looked at while a job is about the first: the job's end disturbs nothing that is shown."""
 
+import threading
+import time
+
 import pytest
 from app_project import make_app_project
 from app_steps import step, stop
@@ -9,6 +12,7 @@ from gazeloc_app.actions.jobs import CancelJob, JobEnded, JobProgressed, StartJo
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.annotation.saving import Saver, annotation_in_files
 from gazeloc_app.app import App
+from gazeloc_app.newest import Newest
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.project import ProjectPanel
@@ -167,25 +171,70 @@ def test_what_is_offered_after_a_start_may_be_about_any_recording(project):
 
 
 class TestTheTableOfStages:
-    def test_it_says_what_runs_and_is_made_anew_when_a_stage_ends_in_the_middle_of_a_job(self, app, begun, project):
+    def table(self, app):
         panel = app.panels.of(ProjectPanel)
+        assert panel.wait()
+        return panel._stages.content
+
+    def test_it_says_what_runs_and_is_made_anew_when_a_stage_ends_in_the_middle_of_a_job(self, app, begun, project):
         step(app, ALIGN["walk"], JobProgressed(0.1, "Align to the scan: fitting"))
-        assert "running" in panel._stages.content
-        before = panel._stages.content.count("fresh")
+        table = self.table(app)
+        assert "running" in table
         artifact = project.artifact("walk", "alignment")
         inputs = pipeline.stage_named("alignment").inputs(project, "walk")
         artifact.write(lambda folder: None, options={}, inputs=inputs)
         step(app, JobProgressed(0.2, "Refine with ICP: icp"))
-        assert panel._stages.content.count("fresh") == before + 1
+        assert self.table(app).count("fresh") == table.count("fresh") + 1
 
     def test_a_job_about_another_recording_runs_none_of_its_stages(self, app, begun):
         step(app, ALIGN["sit"], JobProgressed(0.1, "Align to the scan: fitting"))
-        assert "running" not in app.panels.of(ProjectPanel)._stages.content
+        assert "running" not in self.table(app)
 
     def test_nothing_is_looked_up_while_a_stage_gets_on(self, app, begun, monkeypatch):
+        looked = []
         step(app, ALIGN["walk"], JobProgressed(0.1, "Align to the scan: fitting"))
-        monkeypatch.setattr(pipeline, "statuses", lambda *_: pytest.fail("looked up"))
+        self.table(app)
+        monkeypatch.setattr(pipeline, "statuses", lambda *_: looked.append(1))
         step(app, JobProgressed(0.2, "Align to the scan: fitting still"))
+        self.table(app)
+        assert looked == []
+
+    def test_opening_a_recording_does_not_wait_for_its_files_to_be_read(self, app, monkeypatch):
+        self.table(app)
+        gate, plain = threading.Event(), pipeline.statuses
+        monkeypatch.setattr(pipeline, "statuses", lambda *parts: [gate.wait(20), plain(*parts)][1])
+        open_recording(app, "sit", CLICK)
+        assert len(app.store.state.annotation.keypoints) == 1
+        assert "Looking through the files of sit" in app.panels.of(ProjectPanel)._stages.content
+        gate.set()
+        assert "Choose keyframes" in self.table(app)
+
+
+class TestWorkForTheNewestWish:
+    def test_older_wishes_that_were_not_begun_are_dropped(self):
+        gate, done = threading.Event(), []
+
+        def work(wish):
+            gate.wait(10)
+            done.append((wish, newest.is_newest(wish)))
+
+        newest = Newest(work, "test")
+        newest.ask(0)
+        time.sleep(0.1)  # the first is begun
+        for wish in range(1, 50):
+            newest.ask(wish)
+        gate.set()
+        assert newest.wait(10)
+        assert done == [(0, False), (49, True)]
+
+    def test_one_that_fails_does_not_end_the_others(self):
+        done = []
+        newest = Newest(lambda wish: done.append(1 / wish), "test")
+        newest.ask(0)
+        assert newest.wait(10)
+        newest.ask(2)
+        assert newest.wait(10)
+        assert done == [0.5]
 
 
 def test_what_is_unfolded_of_ended_jobs_is_not_made_anew_while_another_reports(app, begun):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
+from gazeloc_app.newest import Newest
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
+from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 
 _COLORS = {
@@ -21,6 +24,12 @@ _COLORS = {
     State.MISSING: widgets.MUTED,
     State.FAILED: widgets.BAD,
 }
+
+
+class _Wanted(NamedTuple):
+    recording: str
+    method: Method
+    running: str | None
 
 
 class ProjectPanel:
@@ -47,20 +56,36 @@ class ProjectPanel:
         self._dispatch = dispatch
         widgets.on_user(self._run, lambda _: self._run_method(), event="on_click")
         self._stages = gui.add_html("")
+        self._shown: tuple[str, Method] | None = None
+        self._lookup = Newest(self._show_stages, "gazeloc-stages")
 
     def render(self, state: AppState) -> None:
         """Show the state's recording and how its stages stand."""
         self._state = state
         widgets.set_value(self._recording, state.recording)
         widgets.set_property(self._run, "disabled", state.has_job("Run everything"))
-        method, running = state.annotation.method, _running_stage(state)
-        stamps = pipeline.stamps(self._project, state.recording, method)  # a job gets on from stage to stage
-        seen = (state.recording, method, state.data_revision, running, stamps)
-        if seen != self._seen:
-            self._seen = seen
-            statuses = pipeline.statuses(self._project, state.recording, method)
-            rows = [_row(status, is_running=status.title == running) for status in statuses]
-            widgets.set_content(self._stages, widgets.box(widgets.html_table([f"Method {method}", "", ""], rows)))
+        wanted = _Wanted(state.recording, state.annotation.method, _running_stage(state))
+        stamps = pipeline.stamps(self._project, wanted.recording, wanted.method)  # a job gets on from stage to stage
+        if (wanted, stamps, state.data_revision) != self._seen:
+            self._seen = (wanted, stamps, state.data_revision)
+            if (wanted.recording, wanted.method) != self._shown:
+                note = widgets.colored(f"Looking through the files of {wanted.recording} …", widgets.MUTED)
+                widgets.set_content(self._stages, widgets.box(note))
+            self._lookup.ask(wanted)
+
+    def wait(self) -> bool:
+        """Wait until the table is up to date; False where that takes too long."""
+        return self._lookup.wait()
+
+    def _show_stages(self, wanted: _Wanted) -> None:
+        """On a thread of its own: the first time, every file of the recording is read once."""
+        statuses = pipeline.statuses(self._project, wanted.recording, wanted.method)
+        rows = [_row(status, is_running=status.title == wanted.running) for status in statuses]
+        if self._lookup.is_newest(wanted):
+            self._shown = (wanted.recording, wanted.method)
+            widgets.set_content(
+                self._stages, widgets.box(widgets.html_table([f"Method {wanted.method}", "", ""], rows))
+            )
 
     def _run_method(self) -> None:
         keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
