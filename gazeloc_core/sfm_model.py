@@ -12,6 +12,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bytes, Floats, Ints, frozen
 from gazeloc_core.camera import Camera
+from gazeloc_core.errors import GeometryError
 from gazeloc_core.transforms import Similarity, rigid_from_wxyz
 
 
@@ -78,6 +79,9 @@ class TrackedFrames:
             object.__setattr__(self, name, frozen(getattr(self, name), np.int64))
         for name in ("centers", "wxyz", "error_px"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+        rows = {len(getattr(self, name)) for name in ("frame_indices", "centers", "wxyz", "points", "error_px")}
+        if len(rows) > 1 or (np.diff(self.frame_indices) <= 0).any():
+            raise GeometryError("Tracked frames have columns of different lengths, or are not in order.")
 
     def __len__(self) -> int:
         return len(self.frame_indices)

@@ -14,7 +14,7 @@ and without that check differ by less than 0.01°.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -79,6 +79,7 @@ class _Found:
         return cls(found.world_from_camera, int(found.agrees.sum()), float(np.median(found.error_px[found.agrees])))
 
 
+TRACKED_COLUMNS = ("frame_indices", "centers", "wxyz", "points", "error_px")
 _NO_TRACK = _Track(np.empty(0, dtype=np.int64), np.empty((0, 2)))
 
 
@@ -91,8 +92,25 @@ def track_frames(
 ) -> Tracking:
     """The frames of `recording` between, before and after the images of `model` that can be measured.
 
+    See `track_stretches`, whose results these are.
+    """
+    return joined(track_stretches(model, recording, is_taken, options, report))
+
+
+def track_stretches(
+    model: SfmModel,
+    recording: Recording,
+    is_taken: Bools,
+    options: TrackingOptions | None = None,
+    report: Report = silent,
+    *,
+    skip: int = 0,
+) -> Iterator[Tracking]:
+    """The frames between two images after those between the two before them, from the recording's start to its end.
+
     `is_taken` (N,) are the frames that have an image, of this model or another piece; they are not tracked. Each frame
-    is decoded once, in order; the pictures of at most two reaches are held.
+    is decoded once, in order; the pictures of at most two reaches are held. The first `skip` stretches are left out:
+    somebody has them already.
 
     Raises:
         InputError: if a frame does not decode.
@@ -100,27 +118,29 @@ def track_frames(
     """
     options = options or TrackingOptions()
     image_of = {int(frame): image for image, frame in enumerate(model.frame_indices) if frame >= 0}
-    todo = list(
-        stretches(
-            np.sort(np.array([*image_of], np.int64)),
-            is_taken,
-            recording.timestamp_ns,
-            options.reach_s,
-            options.most_frames,
-        )
-    )
-    tracker = _Tracker(model, recording.camera, recording.timestamp_ns, image_of, options)
+    images, times = np.sort(np.array([*image_of], np.int64)), recording.timestamp_ns
+    todo = list(stretches(images, is_taken, times, options.reach_s, options.most_frames))[skip:]
+    tracker = _Tracker(model, recording.camera, times, image_of, options)
     pictures = _Pictures(recording, todo, report)
-    found: dict[int, _Found] = {}
-    refused: Counter[Refusal] = Counter()
     for stretch in todo:
+        found: dict[int, _Found] = {}
+        refused: Counter[Refusal] = Counter()
         for frame, outcome in tracker.poses(stretch, pictures.of(stretch)):
             if isinstance(outcome, Refusal):
                 refused[outcome] += 1
             else:
                 found[frame] = _Found.of(outcome)
-    report(1.0, f"tracked {len(found)} frames")
-    return Tracking(_as_columns(found), sum(len(stretch.frames) for stretch in todo), dict(refused))
+        yield Tracking(_as_columns(found), len(stretch.frames), dict(refused))
+
+
+def joined(parts: Iterable[Tracking]) -> Tracking:
+    """What was tracked in one stretch after the other, as one."""
+    every = [Tracking(_as_columns({}), 0, {}), *parts]
+    refused: Counter[Refusal] = Counter()
+    for part in every:
+        refused.update(part.refused)
+    columns = {name: np.concatenate([getattr(part.tracked, name) for part in every]) for name in TRACKED_COLUMNS}
+    return Tracking(TrackedFrames(**columns), sum(part.tried for part in every), dict(refused))
 
 
 class _Tracker:

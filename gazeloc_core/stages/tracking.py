@@ -1,6 +1,7 @@
 """Stage: the frames between a reconstruction's images, registered by its points (method `sfm`).
 
-Poses are kept in the reconstruction's own frame: another alignment moves them along with the images.
+Poses are kept in the reconstruction's own frame: another alignment moves them along with the images. A long recording
+takes minutes, so what is done is kept beside the artifact: work that was cancelled or killed goes on where it was.
 """
 
 from __future__ import annotations
@@ -11,34 +12,45 @@ from typing import Any
 import numpy as np
 
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.localize.tracking import Tracking, TrackingOptions, track_frames
+from gazeloc_core.hashing import hash_of_value
+from gazeloc_core.localize.tracking import TRACKED_COLUMNS, Tracking, TrackingOptions, track_stretches
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.sfm_model import TrackedFrames
 from gazeloc_core.stages import inputs
-
-_COLUMNS = ("frame_indices", "centers", "wxyz", "points", "error_px")
+from gazeloc_core.stages.begun_tracking import BegunTracking
 
 
 def track_between(
     project: Project, recording: str, options: TrackingOptions | None = None, report: Report = silent
 ) -> list[Tracking]:
-    """Track the frames between the images of every model, the largest first."""
+    """Track the frames between the images of every model, the largest first, from where an interrupted run stopped."""
     options = options or TrackingOptions()
     opened, models = inputs.load_recording(project, recording), inputs.load_sfm_models(project, recording)
     is_taken = np.zeros(len(opened), dtype=np.bool_)
     for model in models:
         is_taken[model.frame_indices[model.frame_indices >= 0]] = True
-    results = []
-    for rank, model in enumerate(models):
-        share = part(report, rank / len(models), (rank + 1) / len(models))
-        results.append(track_frames(model, opened, is_taken, options, share))
-    project.artifact(recording, "tracking").write_arrays(
-        {f"{rank}_{name}": getattr(result.tracked, name) for rank, result in enumerate(results) for name in _COLUMNS},
+    artifact, depends = project.artifact(recording, "tracking"), tracking_inputs(project, recording)
+    begun = BegunTracking(artifact, hash_of_value([depends, asdict(options)]))
+    try:
+        for rank, model in enumerate(models):
+            share = part(report, rank / len(models), (rank + 1) / len(models))
+            for stretch in track_stretches(model, opened, is_taken, options, share, skip=begun.stretches(rank)):
+                begun.put(rank, stretch)
+    finally:
+        begun.save()
+    results = [begun.joined(rank) for rank in range(len(models))]
+    artifact.write_arrays(
+        {
+            f"{rank}_{name}": getattr(result.tracked, name)
+            for rank, result in enumerate(results)
+            for name in TRACKED_COLUMNS
+        },
         options=asdict(options),
-        inputs=tracking_inputs(project, recording),
+        inputs=depends,
         stats=_stats(results),
     )
+    begun.forget()
     return results
 
 
@@ -76,7 +88,7 @@ def load_tracked(project: Project, recording: str, rank: int = 0) -> TrackedFram
     if f"{rank}_frame_indices" not in arrays:
         return None
     try:
-        return TrackedFrames(**{name: arrays[f"{rank}_{name}"] for name in _COLUMNS})
+        return TrackedFrames(**{name: arrays[f"{rank}_{name}"] for name in TRACKED_COLUMNS})
     except (KeyError, ValueError) as error:
         raise ProjectError(
             f"{artifact.folder}: the tracked frames are damaged ({error}); remove it and run again."

@@ -10,6 +10,7 @@ from painted_room import Pictures, head_poses, model_of, recording_of
 from gazeloc_core import pipeline
 from gazeloc_core.artifacts import State
 from gazeloc_core.errors import Cancelled, ProjectError
+from gazeloc_core.localize.tracking import TrackingOptions, track_frames
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import stage_named
 from gazeloc_core.project import Project
@@ -22,18 +23,27 @@ IMAGES = [0, 8, 16, 24]
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Project:
+def pictures() -> Pictures:
+    """The frames of the recording."""
+    return Pictures(head_poses(COUNT))
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: Pictures) -> Project:
     """A project up to its alignment whose recording and reconstruction are those of a painted room."""
     project = make_app_project(tmp_path)
-    poses = head_poses(COUNT)
-    pictures = recording_of(Pictures(poses))
-    monkeypatch.setattr(inputs, "load_recording", lambda project, name: pictures)
+    poses, opened = pictures.poses, recording_of(pictures)
+    monkeypatch.setattr(inputs, "load_recording", lambda project, name: opened)
     models = inputs.model_arrays([model_of(poses, IMAGES)])
     header = project.artifact(NAME, "anchoring").header()
     project.artifact(NAME, "anchoring").write_arrays(models, options={}, inputs=header.inputs)
     header = project.artifact(NAME, "keyframes").header()
     project.artifact(NAME, "keyframes").write_arrays({"keyframes": np.array(IMAGES)}, options={}, inputs=header.inputs)
     return project
+
+
+def taken() -> np.ndarray:
+    return np.isin(np.arange(COUNT), IMAGES)
 
 
 def run(project: Project, report=None):
@@ -58,16 +68,41 @@ def test_what_was_tracked_is_read_back(project: Project):
     assert not run(project).ran
 
 
-def test_cancelled_it_leaves_nothing_and_runs_anew(project: Project):
-    def cancel(fraction: float, text: str = "", /) -> None:
-        if fraction > 0.5:
+def cancel_at(most: float):
+    def report(fraction: float, text: str = "", /) -> None:
+        if fraction > most:
             raise Cancelled
 
+    return report
+
+
+def test_cancelled_it_leaves_no_result_and_goes_on_where_it_was(project: Project, pictures: Pictures):
     with pytest.raises(Cancelled):
-        run(project, cancel)
+        run(project, cancel_at(0.5))
     assert state(project) is State.MISSING
     assert tracking.load_tracked(project, NAME) is None
+    pictures.read_frames.clear()
     assert run(project).ran
+    assert min(pictures.read_frames) == IMAGES[1]  # what lies before was done
+    again = tracking.load_tracked(project, NAME)
+    whole = track_frames(model_of(pictures.poses, IMAGES), recording_of(pictures), taken())
+    np.testing.assert_array_equal(again.centers, whole.tracked.centers)
+    assert not list(project.artifact(NAME, "tracking").folder.parent.glob("*.begun.*"))
+
+
+@pytest.mark.parametrize("content", [b"", b"not arrays", None])
+def test_what_was_begun_with_something_else_or_is_damaged_is_done_anew(project, pictures, content):
+    with pytest.raises(Cancelled):
+        run(project, cancel_at(0.5))
+    (begun,) = project.artifact(NAME, "tracking").folder.parent.glob("*.begun.*")
+    if content is None:
+        tracking.track_between(project, NAME, TrackingOptions(points=150))
+    else:
+        begun.write_bytes(content)
+        pictures.read_frames.clear()
+        run(project)
+        assert min(pictures.read_frames) == 0
+    assert len(tracking.load_tracked(project, NAME)) == COUNT - len(IMAGES)
 
 
 def test_frames_tracked_in_another_reconstruction_are_not_used(project: Project):
