@@ -15,7 +15,7 @@ from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.picture_tiles import Tiles
 
-_MIN_TILES = 12
+_MIN_TILES = 8
 _ROUNDS = 10
 
 

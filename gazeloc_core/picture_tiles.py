@@ -29,7 +29,7 @@ class TileOptions:
     """Standard deviation of the blur before gradients are taken."""
     tile_px: int = 32
     """Side of a tile."""
-    step_px: int = 16
+    step_px: int = 24
     """Distance between tiles."""
     search_px: int = 10
     """How far a tile looks for its place, to each side."""

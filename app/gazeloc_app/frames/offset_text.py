@@ -15,3 +15,8 @@ def offset_text(scores: FrameScores, frame: int) -> str:
     if scores.scan_shift_m[frame] < _WORTH_TELLING_M:
         return text
     return f"{text[:-1]}, besides {100 * scores.scan_shift_m[frame]:.1f} cm by which the scan itself is off there."
+
+
+def short_offset_text(scores: FrameScores, frame: int) -> str:
+    """The offset alone, for lists."""
+    return f"{100 * scores.shift_m[frame]:.1f} cm / {scores.turn_deg[frame]:.1f}°"

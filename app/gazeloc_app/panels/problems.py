@@ -13,6 +13,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import FrameErrors, ProjectData
+from gazeloc_app.frames.offset_text import short_offset_text
 from gazeloc_app.frames.problems import FrameTable, Problem, worst_first
 from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.panels.playing import table_of
@@ -20,6 +21,7 @@ from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
 from gazeloc_core.evaluate import errors_by_mark
 from gazeloc_core.marks import FrameMarks, Mark
+from gazeloc_core.stages.scores import FrameScores
 
 _MOST = 40
 _FIRST = "Nothing is scored yet: “Score the frames” compares each with the scan seen from its pose."
@@ -69,10 +71,11 @@ class ProblemPanel:
         if state is None:
             return
         table = table_of(self._data, state)
-        errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
+        key = self._data.poses_key(state.recording, state.annotation)
+        errors, scores = self._data.errors(state.recording, key), self._data.frame_scores(state.recording, key)
         widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks, errors)))
         frames = self._frames(table, state.annotation.marks)
-        rows = "".join(_row(state, table, errors, frame) for frame in frames[:_MOST])
+        rows = "".join(_row(state, table, scores, errors, frame) for frame in frames[:_MOST])
         if len(frames) > _MOST:
             rows += f"<div>and {len(frames) - _MOST} more</div>"
         widgets.set_content(self._list, widgets.box(f'<div class="gazeloc-frames">{rows}</div>' if rows else "None."))
@@ -105,10 +108,10 @@ def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | No
     return f"{widgets.text(scored)}<br>Problems: {', '.join(counts)}.<br>Marks: {', '.join(marked)}."
 
 
-def _row(state: AppState, table: FrameTable, errors: FrameErrors | None, frame: int) -> str:
+def _row(state: AppState, table: FrameTable, scores: FrameScores | None, errors: FrameErrors | None, frame: int) -> str:
     facts = [f"<b>Frame {frame}</b>"]
-    if np.isfinite(table.score[frame]):
-        facts.append(f"agreement {table.score[frame]:.2f}")
+    if scores is not None and np.isfinite(scores.score[frame]):
+        facts.append(f"agreement {scores.score[frame]:.2f}, looks {short_offset_text(scores, frame)} off")
     if errors is not None and np.isfinite(errors.position_m[frame]):
         facts.append(f"error {100 * errors.position_m[frame]:.1f} cm, {errors.rotation_deg[frame]:.2f}°")
     if not table.has_pose[frame]:
