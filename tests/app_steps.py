@@ -6,6 +6,7 @@ import time
 
 
 def stop(app):
+    app.scene.stop()
     app.jobs.stop()
     app._render.close()
     app.server.stop()

@@ -18,6 +18,7 @@ from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.render_worker import Frame
 from gazeloc_app.drawing.scan_screen import ScanScreen
 from gazeloc_app.frames.gaze_at import gaze_in_scan
+from gazeloc_app.frames.settling import Settling
 from gazeloc_app.kept import Kept
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
@@ -79,6 +80,7 @@ class SceneView:
         self._keypoints = KeypointsLayer(scene, on_drag=self._dragging)
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
+        self._settling = Settling()
 
     def render(self, state: AppState) -> None:
         """Draw the state."""
@@ -95,6 +97,10 @@ class SceneView:
         )
         self._draw_frame(state, trajectory)
         self._show_and_hide(state)
+
+    def stop(self) -> None:
+        """Draw nothing any more."""
+        self._settling.drop()
 
     def facts(self, state: AppState) -> tuple[str, ...]:
         """Sentences about what is drawn with less than there is."""
@@ -167,15 +173,22 @@ class SceneView:
         key = (state.recording, state.frame, trajectory)
 
         def show() -> None:
-            self._selected.show(pose, camera)
-            ray = gaze_in_scan(self._data, state.recording, state.frame, trajectory)
-            self._gaze.show(*((None,) if ray is None else (ray.origin, ray.direction, ray.hit)))
+            if self._once.last("frame") != key:
+                return  # another frame came while this one waited
+            with self._server.atomic():
+                show_camera_and_gaze()
             if pose is not None:
                 job = Frame(recording=state.recording, index=state.frame, width=THUMBNAIL_PX)
                 future = self._render.submit(job, key="thumbnail")
                 future.add_done_callback(when_picture(lambda image: self._paste(key, pose, camera, image)))
 
-        self._once("frame", key, show)
+        def show_camera_and_gaze() -> None:
+            self._selected.show(pose, camera)
+            ray = gaze_in_scan(self._data, state.recording, state.frame, trajectory)
+            self._gaze.show(*((None,) if ray is None else (ray.origin, ray.direction, ray.hit)))
+
+        later = self._settling.now if state.is_playing else self._settling.soon  # a scene drawn anew holds a page up
+        self._once("frame", key, lambda: later(show))
 
     def _paste(self, key: object, pose: RigidTransform, camera: Any, image: Bytes) -> None:
         if self._once.last("frame") == key:  # another frame may have been chosen while this one was decoded

@@ -1,8 +1,9 @@
 // The frame against the render of the scan from its pose, in ways that belong to this browser and outlast a reload.
 //
 // The panel sends a new <div class="gazeloc-comparison"> for each frame, which holds URLs and no pictures. The stage with
-// the pictures is one and the same node that moves into it. One frame's pictures are loaded at a time, and then those of
-// the frame that was asked for last: playing drops frames, and what is shown is always a frame with its own render.
+// the pictures is one and the same node that moves into it. Which frame shows is scrub.js's. One frame's pictures are
+// loaded at a time, small ones first, and then those of the frame that was asked for last: playing drops frames, and what
+// is shown is always a frame with its own render and its own number.
 window.gazelocComparison = (() => {
   const MODES = [
     ["wipe", "Wipe", "Drag over the picture: the frame on the left, the render on the right."],
@@ -14,9 +15,15 @@ window.gazelocComparison = (() => {
     ["two", "A | B", "Below the frame the renders of two methods or alignments; choose B below."],
   ];
   const KEY = "gazeloc-comparison";
+  const PLACES = ["frame", "render", "other"];
   const AHEAD_MS = 400;
+  const AHEAD = [1, 2, -1, 3]; // steps in the direction of the last move
   const choice = Object.assign({ mode: "wipe", wipe: 50, blend: 50, lens: false }, stored());
-  let root, stage, said, gaze, overlay, names, latest, wanted, isBusy, shown, ahead;
+  const failed = new Map(); // by URL, why there is no picture
+  let root, stage, said, gaze, overlay, names, number; // the page's own nodes
+  let wanted, loading, shown, overtaken, ahead; // the frames that are to be shown next, on their way, and shown
+  let turn = 0; // counts the times that what was on its way became outdated
+  let direction = 1;
 
   function stored() {
     try {
@@ -45,8 +52,9 @@ window.gazelocComparison = (() => {
     overlay = make("div", { className: "gazeloc-overlay" });
     said = make("div", { className: "gazeloc-said" });
     names = [0, 1].map(() => make("div", { className: "gazeloc-names" }));
+    number = make("div", { className: "gazeloc-number" });
     const edges = make("canvas", { className: "gazeloc-edges" });
-    stage = make("div", { className: "gazeloc-stage" }, edges, overlay, gaze, said, ...names);
+    stage = make("div", { className: "gazeloc-stage" }, edges, overlay, gaze, number, said, ...names);
     stage.addEventListener("pointerdown", wipe);
     stage.addEventListener("pointermove", (event) => event.buttons === 1 && wipe(event));
     root = make("div", {}, modes, stage, slider("wipe", "Frame | render", "Wipe"), slider("blend", "Blend render", "Blend"));
@@ -88,87 +96,132 @@ window.gazelocComparison = (() => {
       row.hidden = row.dataset.mode !== choice.mode;
       row.querySelector("input").value = choice[row.dataset.mode];
     }
-    if (lens !== choice.lens || (choice.mode === "two" && mode !== "two")) show(latest);
+    if (lens !== choice.lens || (choice.mode === "two" && mode !== "two")) {
+      turn++; // what is on its way is not what is wanted now
+      show(wanted || shown);
+    }
     if (choice.mode === "edges") drawEdges();
   }
 
-  // Move into the box that the panel has sent, and show what it names.
+  // Move into the box that the panel has sent, and pass on what it says.
   function take(box) {
     if (!box.isConnected) return; // a newer one has come already
     if (!root) build();
     box.append(root);
-    const share = Number(box.dataset.number) / Math.max(Number(box.dataset.last), 1);
-    document.documentElement.style.setProperty("--gazeloc-frame", `${100 * share}%`);
-    latest = { ...box.dataset, overlay: [...box.querySelector(".gazeloc-overlay").children] };
-    show(latest);
+    window.gazelocScrub.take(saidBy(box));
   }
 
+  // What a box says: one frame's number, gaze and overlay, and where to find the pictures of any frame.
+  function saidBy(box) {
+    const { number, last, show, frame, render, other, poses, otherPoses, names, none, marks, aspect, lensAspect, gaze, lensGaze } =
+      box.dataset;
+    const series = [show, frame, render, other, names, marks].join(" ");
+    const common = { series, show, last: Number(last), names: names.split("|"), aspect, lensAspect, at };
+    function at(number) {
+      const url = (template, hex) => (template && (!hex || hasPose(hex, number)) ? template.replace("{}", number) : "");
+      const pictures = { frame: url(frame), render: url(render, poses), other: url(other, otherPoses) };
+      return { ...common, ...pictures, number, none: "", gaze: "", lensGaze: "", overlay: [] };
+    }
+    const overlay = [...box.querySelector(".gazeloc-overlay").children];
+    return { ...at(Number(number)), none, gaze, lensGaze, overlay };
+  }
+
+  // Whether a frame's bit is set; the first of each digit's four is the highest.
+  function hasPose(hex, number) {
+    return (parseInt(hex[number >> 2] || "0", 16) >> (3 - (number & 3))) & 1;
+  }
+
+  // Show a frame: at once where its pictures are here, else when they come; of those asked for meanwhile the last.
   function show(what) {
     if (!what) return;
-    wanted = what;
-    if (!isBusy) work();
+    if (loading && loading.turn === turn && isSame(loading, what)) {
+      Object.assign(loading, what);
+      if (shown === loading) describe(shown);
+      wanted = undefined;
+      return;
+    }
+    const here = urls(what).map((url) => url && pictures().ready(url));
+    if (here.every((image) => image !== undefined)) {
+      turn++;
+      wanted = undefined;
+      put(what, here);
+    } else {
+      wanted = what;
+      if (!loading) work();
+    }
+    if (overtaken) overtaken();
   }
 
   async function work() {
-    isBusy = true;
     clearTimeout(ahead);
     while (wanted) {
-      const what = wanted;
+      loading = { ...wanted, turn };
       wanted = undefined;
-      await load(what);
+      await load(loading);
     }
-    isBusy = false;
+    loading = undefined;
     ahead = setTimeout(lookAhead, AHEAD_MS);
   }
 
-  function through(url) {
-    return url && choice.lens ? `${url}&lens=1` : url;
+  async function load(what) {
+    const of = urls(what), isWhole = of.every((url) => !url || pictures().ready(url));
+    if (!isWhole) {
+      const quick = await Promise.all(of.map((url) => url && fetched(url, "quick")));
+      if (what.turn === turn && quick.every((image) => image !== undefined)) put(what, quick, "quick");
+      if (what.turn !== turn || wanted) return;
+    }
+    const newer = new Promise((done) => (overtaken = done));
+    const whole = await Promise.race([Promise.all(of.map((url) => url && fetched(url))), newer]);
+    overtaken = undefined;
+    if (what.turn === turn && whole) put(what, whole.map((image) => image || ""));
   }
 
-  async function load(what, tries = 3) {
-    const urls = [what.frame, what.render, choice.mode === "two" ? what.other : ""].map(through);
-    const [frame, render, other] = await Promise.all(urls.map(picture));
-    const isMissing = (urls[0] && !frame) || (urls[1] && !render) || (urls[2] && !other);
-    if (isMissing && !wanted && tries > 1) {
-      await new Promise((done) => setTimeout(done, 250)); // another browser's frame came first: ask again
-      return wanted ? undefined : load(what, tries - 1);
-    }
-    if (isMissing && wanted) return undefined;
+  // The picture; undefined where there is none, and then `failed` says why.
+  async function fetched(url, how) {
+    const { image, why } = await pictures().load(url, how);
+    failed.set(url, why);
+    return image;
+  }
+
+  function urls(what) {
+    const through = (url) => (url && choice.lens ? `${url}&lens=1` : url);
+    return [what.frame, what.render, choice.mode === "two" ? what.other : ""].map(through);
+  }
+
+  function isSame(one, other) {
+    return [...urls(one)].join() === [...urls(other)].join();
+  }
+
+  function pictures() {
+    return window.gazelocPictures;
+  }
+
+  // Frame, render and B into the stage, as images or "" for none.
+  function put(what, images, how = "whole") {
+    if (shown && shown.number !== what.number) direction = Math.sign(what.number - shown.number);
     shown = what;
-    put("frame", frame);
-    put("render", render);
-    put("other", other);
-    describe(what, { frame, render, other });
+    PLACES.forEach((place, i) => putOne(place, images[i]));
+    stage.dataset.quality = how;
+    describe(what);
     if (choice.mode === "edges") drawEdges();
     stage.dataset.shown = what.number;
-    return undefined;
+    clearTimeout(ahead);
+    if (!loading) ahead = setTimeout(lookAhead, AHEAD_MS);
   }
 
-  async function picture(url) {
-    if (!url) return null;
-    const image = new Image();
-    image.src = url;
-    try {
-      await image.decode();
-      return image;
-    } catch {
-      return null;
-    }
+  function putOne(place, image) {
+    const before = stage.querySelector(`img.gazeloc-${place}`);
+    if (image && image !== before) {
+      if (image.parentNode === stage) image = image.cloneNode(); // A and B may be the same picture
+      image.alt = place;
+      image.className = `gazeloc-${place}`;
+      if (before) before.replaceWith(image);
+      else stage.insertBefore(image, stage.querySelector(place === "frame" ? "*" : ".gazeloc-edges"));
+    } else if (!image && before) before.remove();
   }
 
-  function put(alt, image) {
-    const before = stage.querySelector(`img.gazeloc-${alt}`);
-    if (image) {
-      image.alt = alt;
-      image.className = `gazeloc-${alt}`;
-      image.draggable = false;
-    }
-    if (before && image) before.replaceWith(image);
-    else if (before) before.remove();
-    else if (image) stage.insertBefore(image, stage.querySelector(alt === "frame" ? "*" : ".gazeloc-edges"));
-  }
-
-  function describe(what, { frame, render, other }) {
+  function describe(what) {
+    const [frame, render, other] = PLACES.map((place) => stage.querySelector(`img.gazeloc-${place}`));
     stage.style.setProperty("--gazeloc-aspect", choice.lens ? what.lensAspect : what.aspect);
     const [x, y] = (choice.lens ? what.lensGaze : what.gaze).split(" ");
     gaze.hidden = !y;
@@ -176,55 +229,35 @@ window.gazelocComparison = (() => {
     gaze.style.setProperty("--gazeloc-gaze-y", `${y}%`);
     overlay.replaceChildren(...what.overlay);
     overlay.hidden = choice.lens; // keypoints are known in undistorted frames
-    const [first, second] = what.names.split("|");
+    const [first, second] = what.names;
     names[0].textContent = `A ${first}${render ? "" : ": no pose"}`;
     names[1].textContent = `B ${second || "not chosen"}${other || !second ? "" : ": no pose"}`;
     stage.toggleAttribute("data-none", !render);
     stage.toggleAttribute("data-none-other", !other);
-    if (!frame) said.textContent = "the frame could not be read";
-    else if (!what.render) said.textContent = choice.mode === "two" ? "" : "no pose, so no render";
-    else said.textContent = render ? "" : "the render could not be drawn";
+    number.textContent = `frame ${what.number}`;
+    const [frameUrl, renderUrl] = urls(what);
+    if (!frame) said.textContent = failed.get(frameUrl) || "";
+    else said.textContent = renderUrl ? (render ? "" : failed.get(renderUrl) || "") : what.none;
   }
 
-  // Where the render's brightness changes most, in a colour that rooms seldom have.
   function drawEdges() {
-    const image = stage.querySelector("img.gazeloc-render"), canvas = stage.querySelector("canvas");
-    if (!image || !image.naturalWidth) return;
-    const width = Math.min(image.naturalWidth, 700), height = Math.round((width * image.naturalHeight) / image.naturalWidth);
-    canvas.width = width;
-    canvas.height = height;
-    const pen = canvas.getContext("2d", { willReadFrequently: true });
-    pen.filter = "blur(0.8px)";
-    pen.drawImage(image, 0, 0, width, height);
-    const pixels = pen.getImageData(0, 0, width, height), data = pixels.data;
-    const grey = new Float32Array(width * height), steep = new Float32Array(width * height);
-    for (let i = 0; i < grey.length; i++) grey[i] = 0.3 * data[4 * i] + 0.6 * data[4 * i + 1] + 0.1 * data[4 * i + 2];
-    const counts = new Uint32Array(512);
-    for (let y = 1; y < height - 1; y++)
-      for (let i = y * width + 1; i < (y + 1) * width - 1; i++) {
-        steep[i] = Math.hypot(grey[i + 1] - grey[i - 1], grey[i + width] - grey[i - width]);
-        counts[Math.min(steep[i] | 0, 511)]++;
-      }
-    let limit = 511;
-    for (let sum = 0; limit > 6 && sum < 0.07 * grey.length; limit--) sum += counts[limit];
-    for (let i = 0; i < grey.length; i++) {
-      data.set([255, 0, 200, steep[i] > limit ? 230 : 0], 4 * i);
-    }
-    pen.putImageData(pixels, 0, 0);
+    const image = stage.querySelector("img.gazeloc-render");
+    if (image && image.naturalWidth) window.gazelocEdges.draw(image, stage.querySelector("canvas"));
   }
 
-  // While nothing else is to be done, have the neighbours' pictures ready in the browser's cache.
+  // While nothing else is to be done, fetch the next frames in the direction of the last move, and the one before.
   async function lookAhead() {
     const at = shown;
-    for (const item of at && at.posed ? at.posed.split(" ") : []) {
-      const [number, hasPose] = item.split(":");
-      const swap = (url) => through(url.replace(/\d+\.jpg/, `${number}.jpg`));
-      await picture(swap(at.frame));
-      if (isBusy || shown !== at) return;
-      if (hasPose === "1" && at.render) await picture(swap(at.render));
-      if (isBusy || shown !== at) return;
+    for (const step of AHEAD) {
+      const next = at.number + step * direction;
+      if (next < 0 || next > at.last) continue;
+      for (const url of urls(at.at(next))) {
+        if (!url || pictures().ready(url)) continue;
+        await pictures().load(url, "ahead");
+        if (loading || shown !== at) return;
+      }
     }
   }
 
-  return { take, choose };
+  return { take, show, choose };
 })();

@@ -51,5 +51,5 @@ window.gazeloc = (function session() {
     ask("name", { name: kept("localStorage", NAME, name) });
   }
 
-  return { ask, hello, rename, onHello: (listener) => listeners.push(listener) };
+  return { ask, hello, rename, tab, onHello: (listener) => listeners.push(listener) };
 })();

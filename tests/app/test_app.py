@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,8 +17,6 @@ from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.actions.views import ShowFrame, ShowLayer
 from gazeloc_app.app import App
-from gazeloc_app.drawing.pictures import Pictures
-from gazeloc_app.drawing.render_process import RenderProcess, Superseded
 from gazeloc_app.frames.sightings import frame_pose, triangulated
 from gazeloc_app.state import Layer, Level
 from gazeloc_app.work import tasks
@@ -234,10 +231,10 @@ def test_a_render_needs_an_alignment_that_there_is(app, rev):
 @pytest.mark.parametrize(
     ("label", "value"),
     [
-        ("Frame", 10**9),
-        ("Frame", -1),
-        ("Frame", float("nan")),
-        ("Frame", "3"),
+        ("Every n-th", 10**9),
+        ("Every n-th", -1),
+        ("Every n-th", float("nan")),
+        ("Every n-th", "3"),
         ("Recording", "../../etc/passwd"),
         ("In force", "made up"),
         ("Selected", "k99 · x"),
@@ -258,10 +255,10 @@ def test_a_value_that_a_widget_does_not_offer_changes_nothing(app, label, value)
 
 
 def test_a_value_that_a_widget_offers_is_an_action(app):
-    (slider,) = widgets(app, "Frame")
+    (slider,) = widgets(app, "Every n-th")
     send(app, slider, 5)
     step(app)
-    assert app.store.state.frame == 5
+    assert app.store.state.layers.thinning == 5
     (box,) = widgets(app, Layer.SCAN.value)
     send(app, box, False)
     step(app)
@@ -314,58 +311,3 @@ def test_layers_hide_and_labels_of_hidden_layers_too(app):
     step(app, ShowLayer(Layer.KEYPOINTS, False), SelectPair(None), PickPoint(Side.SCAN, (1, 1, 0)))
     assert not app.server.scene._handle_from_node_name["/keypoints/k1/scan"].visible
     assert not app.server.scene._handle_from_node_name["/keypoints/k6/scan"].visible
-
-
-def test_browsers_that_ask_for_the_shown_frame_share_it_and_late_ones_do_not_push_it_aside(app, monkeypatch):
-    gate, asked = threading.Event(), []
-
-    def slowly(self, job):
-        gate.wait(10)
-        asked.append(job.index)
-        return str(job.index).encode()
-
-    monkeypatch.setattr(RenderProcess, "_answer", slowly)
-    process = RenderProcess(None)
-    state = [app.store.state]
-    pictures = Pictures(app.data, process, lambda: state[0])
-
-    async def browse():
-        first = asyncio.create_task(pictures.frame("walk", 0, {}))
-        await asyncio.sleep(0.05)
-        state[0] = ShowFrame(6).apply(state[0])
-        both = [asyncio.create_task(pictures.frame("walk", 6, {})) for _ in range(2)]
-        late = [asyncio.create_task(pictures.frame("walk", index, {})) for index in (3, 4)]
-        await asyncio.sleep(0.05)
-        gate.set()
-        return await asyncio.gather(first, *both, *late, return_exceptions=True)
-
-    answers = asyncio.run(browse())
-    process.close()
-    assert answers[:3] == [b"0", b"6", b"6"]
-    assert isinstance(answers[3], Superseded)
-    assert asked == [0, 6, 4]
-
-
-def test_small_pictures_for_lists_come_after_the_frame_that_is_shown(app, monkeypatch):
-    gate, asked = threading.Event(), []
-
-    def slowly(self, job):
-        gate.wait(10)
-        asked.append(job.index)
-        return b""
-
-    monkeypatch.setattr(RenderProcess, "_answer", slowly)
-    process = RenderProcess(None)
-    pictures = Pictures(app.data, process, lambda: app.store.state)
-
-    async def browse():
-        small = [asyncio.create_task(pictures.thumbnail("walk", index, {})) for index in (5, 7, 9)]
-        await asyncio.sleep(0.05)
-        shown = asyncio.create_task(pictures.frame("walk", app.store.state.frame, {}))
-        await asyncio.sleep(0.05)
-        gate.set()
-        await asyncio.gather(shown, *small)
-
-    asyncio.run(browse())
-    process.close()
-    assert asked == [5, app.store.state.frame, 7, 9]

@@ -36,7 +36,7 @@ def page(app, open_page):
 
 
 def shown(page, frame):
-    page.page.wait_for_selector(f'.gazeloc-stage[data-shown="{frame}"]', timeout=60_000)
+    page.page.wait_for_selector(f'.gazeloc-stage[data-shown="{frame}"][data-quality="whole"]', timeout=60_000)
 
 
 def show(page, frame):
@@ -82,6 +82,7 @@ def test_the_original_lens_shows_both_pictures_in_the_recordings_shape(page):
     page.page.get_by_label("Original lens").check()
     sizes = "() => ['frame', 'render'].map(a => document.querySelector(`.gazeloc-stage img.gazeloc-${a}`))"
     page.page.wait_for_function(f"() => ({sizes})().every(i => i && i.src.includes('lens=1'))")
+    shown(page, 4)
     lens = page.app.data.recording("walk").camera
     for width, height in page.page.evaluate(f"() => ({sizes})().map(i => [i.naturalWidth, i.naturalHeight])"):
         assert (width, height) == (lens.width, lens.height)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.render_worker import Frame, Render, camera_text
-from gazeloc_app.state import AppState
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.methods import Method
@@ -19,29 +18,31 @@ from gazeloc_core.transforms import wxyz_of
 
 WIDTH_PX = 900
 """Wide enough for the panel: more is not seen there and takes longer to scrub."""
+QUICK_PX = WIDTH_PX // 4
+"""Wide enough to see where a frame is; shown until the picture in full is there."""
 THUMBNAIL_PX = 144
+_PAGE = re.compile(r"[a-z0-9]{0,40}")
 _KEY = re.compile(rf"[0-9a-f]{{1,64}}|({'|'.join(Method)})@[0-9a-f-]{{1,64}}")
 
 
 class Pictures:
-    """Asks the drawing process, so that of all frames that were scrubbed over only the last is drawn.
+    """Asks the drawing process, so that of all frames that a page was scrubbed over only the last is drawn.
 
-    All browsers show the frame of the state. So a picture of that frame may push aside the others that wait, but a
-    slow browser's late request for an earlier frame may not push aside that one; and browsers that ask for the same
-    picture share it. Small pictures for lists, and neighbours that a page fetches while it is idle, are drawn while
-    nothing else is to be drawn.
+    The query's `page` names who asks: pages do not push each other's pictures aside, and those that ask for the same
+    one share it. With `quick=1` it is a quarter as wide and drawn before any in full. Small pictures for lists, and
+    neighbours that a page fetches while it is idle (`ahead=1`), are drawn while nothing else is to be drawn.
     """
 
-    def __init__(self, data: ProjectData, process: RenderProcess, state: Callable[[], AppState]):
-        self._data, self._process, self._state = data, process, state
+    def __init__(self, data: ProjectData, process: RenderProcess):
+        self._data, self._process = data, process
         self._asked: dict[tuple[Frame | Render, str], Future[Any]] = {}
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """A frame as JPEG, undistorted; with `tags=1` the tags in it are drawn, with `lens=1` it is as recorded."""
         lens = query.get("lens") == "1"
         tags = query.get("tags") == "1" and not lens
-        job = Frame(recording=recording, index=index, width=WIDTH_PX, with_tags=tags, as_recorded=lens)
-        return await self._picture("frame", recording, index, job)
+        job = Frame(recording=recording, index=index, width=_width(query), with_tags=tags, as_recorded=lens)
+        return await self._picture("frame", query, job)
 
     async def thumbnail(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """A frame as a small JPEG for lists; every one that is asked for is made, after what people look at."""
@@ -64,20 +65,28 @@ class Pictures:
         w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
         cx, cy, cz = (float(value) for value in pose.translation)
         job = Render(
-            camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=min(WIDTH_PX, camera.width)
+            camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=min(_width(query), camera.width)
         )
         kind = f"render {query.get('rev')}"  # poses side by side do not push each other aside
-        return await self._picture(kind, recording, index, job)
+        return await self._picture(kind, query, job)
 
     def _camera(self, recording: str, query: Mapping[str, str]) -> Camera | None:
         return self._data.recording(recording).camera if query.get("lens") == "1" else self._data.camera(recording)
 
-    async def _picture(self, kind: str, recording: str, index: int, job: Frame | Render) -> bytes:
-        state = self._state()
-        when = "now" if (recording, index) == (state.recording, state.frame) else "before"
+    async def _picture(self, kind: str, query: Mapping[str, str], job: Frame | Render) -> bytes:
+        page = query.get("page", "")
+        if not _PAGE.fullmatch(page):
+            raise InputError("A page's id is letters and digits.")
+        is_quick, is_ahead = query.get("quick") == "1", query.get("ahead") == "1"
+        when = "ahead" if is_ahead else "quick" if is_quick else "now"
         waiting = self._asked.get((job, when))
         if waiting is None or waiting.done():
             self._asked = {asked: future for asked, future in self._asked.items() if not future.done()}
-            waiting = self._process.submit(job, key=f"{kind} {when}", is_later=when == "before")
+            key = f"{kind} {when} {page}"
+            waiting = self._process.submit(job, key=key, is_later=is_ahead, is_urgent=is_quick)
             self._asked[job, when] = waiting
         return bytes(await asyncio.wrap_future(waiting))
+
+
+def _width(query: Mapping[str, str]) -> int:
+    return QUICK_PX if query.get("quick") == "1" else WIDTH_PX

@@ -32,7 +32,7 @@ from gazeloc_core.errors import GazelocError, RenderError
 _log = logging.getLogger(__name__)
 _CACHE_BYTES = 192 * 1024 * 1024
 _MAX_FAILED_STARTS = 3
-_URGENT, _NORMAL, _LATER = 0, 1, 2
+_URGENT, _SOON, _NORMAL, _LATER = 0, 1, 2, 3
 
 
 class Superseded(GazelocError):
@@ -69,11 +69,14 @@ class RenderProcess:
         self._supervisor = threading.Thread(target=self._supervise, name="render supervisor", daemon=True)
         self._supervisor.start()
 
-    def submit(self, job: Job, key: str | None = None, *, is_later: bool = False) -> Future[Any]:
+    def submit(
+        self, job: Job, key: str | None = None, *, is_later: bool = False, is_urgent: bool = False
+    ) -> Future[Any]:
         """The answer to come: JPEG bytes (`Render`, `Frame`), a `CastAnswer`, or a `Description`.
 
-        One that `is_later` waits until nothing else does. With a `key`, requests with that key which have not begun
-        end as `Superseded`. The future raises `RenderError` where the process died, and what reading the frame raised.
+        One that `is_later` waits until nothing else does, one that `is_urgent` for no other picture. With a `key`,
+        requests with that key which have not begun end as `Superseded`. The future raises `RenderError` where the
+        process died, and what reading the frame raised.
         """
         future: Future[Any] = Future()
         future.set_running_or_notify_cancel()  # a waiting job is dropped by its key, not by cancelling
@@ -86,7 +89,7 @@ class RenderProcess:
             elif cached is not None:
                 future.set_result(cached)
             else:
-                usual = _LATER if is_later else _NORMAL
+                usual = _LATER if is_later else _SOON if is_urgent else _NORMAL
                 rank = (_URGENT if isinstance(job, Cast) else usual, next(self._numbers))
                 self._waiting.append(_Waiting(rank, job, key, future))
                 self._changed.notify()

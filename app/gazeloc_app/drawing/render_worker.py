@@ -157,6 +157,7 @@ class _Studio:
         self._renderer: Renderer | None = None
         self._rays: RayRenderer | None = None
         self._recordings: dict[str, tuple[Recording, FrameSource | VideoCursor, Undistorter]] = {}
+        self._last_read: tuple[tuple[str, int, bool], Bytes] | None = None
 
     def answer(self, job: Job) -> Any:
         match job:
@@ -208,15 +209,20 @@ class _Studio:
         recording, frames, undistorter = self._recordings[job.recording]
         if not 0 <= job.index < len(recording):
             raise InputError(f"There is no frame {job.index}; the recording {job.recording!r} has {len(recording)}.")
-        image = frames.read(job.index)
-        if job.as_recorded:
-            return image
-        image = undistorter.image(image)
-        if job.with_tags and job.recording in self._sources.tags:
+        image = self._read(job, frames, undistorter)
+        if job.with_tags and not job.as_recorded and job.recording in self._sources.tags:
             seen = self._sources.tags[job.recording]()
             tags = drawn_tags(seen.sightings, job.index, undistorter.target, seen.size_m)
             image = draw_tags(image, tags, undistorter.target, seen.size_m)
         return image
+
+    def _read(self, job: Frame, frames: FrameSource | VideoCursor, undistorter: Undistorter) -> Bytes:
+        """The frame, as recorded or undistorted; the last one is kept, as pages ask for it quickly and then in full."""
+        what = (job.recording, job.index, job.as_recorded)
+        if self._last_read is None or self._last_read[0] != what:
+            image = frames.read(job.index)
+            self._last_read = (what, image if job.as_recorded else undistorter.image(image))
+        return self._last_read[1]
 
     def _cast(self, job: Cast) -> CastAnswer:
         caster = self._caster()

@@ -6,12 +6,10 @@ The page's half (static/page/timeline.js and .css) turns a click into the frame 
 from __future__ import annotations
 
 from itertools import pairwise
-from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gazeloc_app import widgets
 from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal
 from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Floats
@@ -34,9 +32,7 @@ MARK_COLORS = {mark: hexadecimal(color) for mark, color in MARKS.items()}
 MARK_SIGNS = {Mark.GOOD: "✓", Mark.BAD: "✗", Mark.UNSURE: "?"}
 
 
-def timeline_html(
-    recording: str, trajectory: Trajectory | None, score: Floats, error_m: Floats | None, marks: FrameMarks
-) -> str:
+def timeline_html(trajectory: Trajectory | None, score: Floats, error_m: Floats | None, marks: FrameMarks) -> str:
     """The whole timeline of a recording of N frames; `score` (N,) and `error_m` (N,) are NaN where there is none."""
     count = len(score)
     status = np.full(count, PoseStatus.NONE.value) if trajectory is None else trajectory.status
@@ -53,11 +49,11 @@ def timeline_html(
         top = max(float(np.nanpercentile(error_m, 98)), 1e-6)
         rows.append(_curve(-error_m, 0.0, hexadecimal(ERROR), low=-top))
         legend.append(f'<i style="background:{hexadecimal(ERROR)}"></i>error, down to {100 * top:.1f} cm')
-    url = widgets.text(f"/show/{quote(recording)}/")
     return (
-        f'<div class="gazeloc-timeline" data-show="{url}" data-last="{count - 1}"'
+        f'<div class="gazeloc-timeline" data-last="{count - 1}"'
         ' onpointerdown="gazelocTimeline.go(event)" onpointermove="gazelocTimeline.drag(event)"'
-        f' title="Click to go to a frame">{"".join(rows)}<b></b></div>'
+        f' title="Click to go to a frame">{"".join(rows)}<b></b>'
+        '<img alt="" src="data:," style="display:none" onerror="gazelocScrub.ready()"></div>'
         f'<div class="gazeloc-legend">{" ".join(f"<span>{item}</span>" for item in legend)}</div>'
     )
 

@@ -1,6 +1,8 @@
 """The comparison in the panel “Frame”: which pictures the page shows of a frame. How it shows them is the page's own.
 
-The page's half is static/page/comparison.js and .css; the pictures are URLs of our own routes (pictures.py).
+The page's half is static/page/comparison.js and .css; the pictures are URLs of our own routes (pictures.py). The URLs
+have `{}` for the frame's number, and which frames have a pose is said too, so that a page can go to another frame
+before it is told of that one (static/page/scrub.js).
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ import secrets
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 from viser import GuiApi
 
 from gazeloc_app import widgets
@@ -18,10 +21,11 @@ from gazeloc_app.frames.frame_marks import marks_in_frame
 from gazeloc_app.frames.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.state import AppState, Layer
-from gazeloc_core.trajectory import PoseStatus
 
-_AHEAD = (1, -1, 2)
-"""The frames, from the one that is shown, whose pictures a page may fetch while it is idle."""
+NO_POSES = "No poses yet: press “Run everything” in the tab Project, or align keypoints in the tab Align."
+NO_POSE = (
+    "This frame has no pose, so there is no render of it; “keyframe ▶” and the timeline lead to frames that have one."
+)
 
 
 class ComparisonHtml:
@@ -32,19 +36,41 @@ class ComparisonHtml:
         self._data = data
         self._revision = secrets.token_hex(4)  # the frames of this session; the browser may keep them
         self._html = gui.add_html("")
+        self._marks: object = None
+        self._marks_revision = 0
 
     def show(self, state: AppState, frame: int, other: tuple[str, str | None] | None = None) -> None:
         """The state's frame; `other` names other poses to compare with: a text for people, and their key."""
+        key = self._data.poses_key(state.recording, state.annotation)
         values = {
             "NUMBER": str(frame),
             "LAST": str(len(self._data.recording(state.recording)) - 1),
-            **self._pictures(state, frame, other),
+            "SHOW_URL": f"/show/{quote(state.recording)}/",
+            "NONE": self._why_none(state.recording, key, frame),
+            "MARKS": str(self._revision_of_marks(state)),
+            **self._pictures(state, key, other),
             **self._shapes(state, frame),
         }
         content = self._template
-        for key, value in values.items():
-            content = content.replace(f"@{key}@", widgets.text(value))
+        for name, value in values.items():
+            content = content.replace(f"@{name}@", widgets.text(value))
         widgets.set_content(self._html, content.replace("@KEYPOINTS@", self._keypoints_svg(state, frame)))
+
+    def _revision_of_marks(self, state: AppState) -> int:
+        """Counts up where keypoints in frames may have changed: pages remember frames by it."""
+        annotation = state.annotation
+        chosen = (annotation.alignment, state.selected_key, state.layers.is_visible(Layer.KEYPOINTS))
+        marks = (annotation.keypoints, *chosen, state.data_revision)
+        if marks != self._marks:
+            self._marks = marks
+            self._marks_revision += 1
+        return self._marks_revision
+
+    def _why_none(self, recording: str, key: str | None, frame: int) -> str:
+        trajectory = self._data.trajectory(recording, key)
+        if trajectory is None or not trajectory.has_pose.any():
+            return NO_POSES
+        return NO_POSE if frame >= len(trajectory) or not trajectory.has_pose[frame] else ""
 
     def _keypoints_svg(self, state: AppState, frame: int) -> str:
         camera = self._data.camera(state.recording)
@@ -53,31 +79,29 @@ class ComparisonHtml:
         marks, lines = marks_in_frame(self._data, state, Side.SFM, frame)
         return marks_svg(marks, lines, camera, state.selected_key, frame)
 
-    def _pictures(self, state: AppState, frame: int, other: tuple[str, str | None] | None) -> dict[str, str]:
-        key = self._data.poses_key(state.recording, state.annotation)
-        url = f"/frames/{quote(state.recording)}/{frame}.jpg?rev={self._revision}"
+    def _pictures(self, state: AppState, key: str | None, other: tuple[str, str | None] | None) -> dict[str, str]:
+        url = f"/frames/{quote(state.recording)}/{{}}.jpg?rev={self._revision}"
         if state.draws_tags:
             url += f"{state.data_revision}&tags=1"
-        last = len(self._data.recording(state.recording)) - 1
-        around = [frame + step for step in _AHEAD if 0 <= frame + step <= last]
+        render, poses = self._renders(state.recording, key)
+        other_render, other_poses = self._renders(state.recording, other[1] if other else None)
+        names = [name_of_poses(state), *([other[0].replace("|", " ")] if other else [])]
         return {
             "FRAME_URL": url,
-            "RENDER_URL": self._render_url(state.recording, key, frame),
-            "OTHER_URL": self._render_url(state.recording, other[1], frame) if other else "",
-            "NAMES": "|".join([name_of_poses(state), *([other[0].replace("|", " ")] if other else [])]),
-            "POSED": " ".join(f"{at}:{int(self._has_pose(state.recording, key, at))}" for at in around),
+            "RENDER_URL": render,
+            "OTHER_URL": other_render,
+            "POSES": poses,
+            "OTHER_POSES": other_poses,
+            "NAMES": "|".join(names),
         }
 
-    def _render_url(self, recording: str, key: str | None, frame: int) -> str:
-        if key is None or not self._has_pose(recording, key, frame):
-            return ""
-        return f"/renders/{quote(recording)}/{frame}.jpg?rev={quote(key)}"
-
-    def _has_pose(self, recording: str, key: str | None, frame: int) -> bool:
-        trajectory = self._data.trajectory(recording, key)
-        if trajectory is None or frame >= len(trajectory):
-            return False
-        return PoseStatus(str(trajectory.status[frame])).has_pose
+    def _renders(self, recording: str, key: str | None) -> tuple[str, str]:
+        """The URL of renders from the poses of a key, and which frames have one: a bit each, as hexadecimal digits."""
+        trajectory = None if key is None else self._data.trajectory(recording, key)
+        if key is None or trajectory is None:
+            return "", ""
+        url = f"/renders/{quote(recording)}/{{}}.jpg?rev={quote(key)}"
+        return url, np.packbits(trajectory.has_pose).tobytes().hex()
 
     def _shapes(self, state: AppState, frame: int) -> dict[str, str]:
         camera, lens = self._data.camera(state.recording), self._data.recording(state.recording).camera

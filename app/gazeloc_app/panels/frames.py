@@ -13,7 +13,7 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
-from gazeloc_app.actions.views import CompareWith, DrawTags, ShowFrame
+from gazeloc_app.actions.views import CompareWith, DrawTags
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.offset_text import offset_text
 from gazeloc_app.frames.sightings import image_of_frame
@@ -21,6 +21,7 @@ from gazeloc_app.frames.timeline_html import MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
 from gazeloc_app.panels.playing import PlayWidgets
+from gazeloc_app.panels.scrubber import Scrubber
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import PoseStatus
@@ -54,7 +55,7 @@ class FramePanel:
         self._seen_timeline: object = None
         self._others: dict[str, str] = {NOTHING: ""}
         self._comparison = ComparisonHtml(gui, template, data)
-        self._slider = gui.add_slider("Frame", 0, 1, 1, 0, hint="Which frame of the recording shows, everywhere.")
+        self._scrubber = Scrubber(gui)
         self._timeline = gui.add_html("")
         self._facts = gui.add_html("")
         self._marks = MarkWidgets(gui, dispatch)
@@ -71,7 +72,6 @@ class FramePanel:
             "B, for A | B", (NOTHING,), hint="The render from another method's poses or another alignment, below A's."
         )
         widgets.on_user(self._tags, lambda event: dispatch(DrawTags(bool(event.target.value))))
-        widgets.on_user(self._slider, lambda event: self._show(int(event.target.value)))
         widgets.on_user(self._look, lambda event: look_through(event.client_id, self._frame()), event="on_click")
         widgets.on_user(self._other, lambda event: self._compare_with(str(event.target.value)))
 
@@ -92,9 +92,8 @@ class FramePanel:
             return
         self._seen = seen
         last = len(self._data.recording(state.recording)) - 1
-        widgets.set_property(self._slider, "max", max(last, 1))
+        self._scrubber.show(last)
         frame = min(state.frame, last)
-        widgets.set_value(self._slider, frame)
         trajectory = self._data.trajectory(state.recording, key)
         status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
         has_pose = PoseStatus(status).has_pose
@@ -116,7 +115,7 @@ class FramePanel:
         mark = state.annotation.marks.get(frame)
         if mark is not None:
             lines.append(widgets.colored(f"{MARK_SIGNS[mark.mark]} marked {mark.mark}", widgets.MARK_COLORS[mark.mark]))
-        return "<br>".join(lines)
+        return f'<div class="gazeloc-facts">{"<br>".join(lines)}</div>'
 
     def _score_text(self, state: AppState, frame: int) -> str:
         found = self._data.frame_scores(state.recording, self._data.poses_key(state.recording, state.annotation))
@@ -125,6 +124,8 @@ class FramePanel:
         return f"Agreement with the scan: {found.score[frame]:.2f}. {offset_text(found, frame)}"
 
     def _error_text(self, state: AppState, frame: int) -> str:
+        if self._data.truth(state.recording) is None:
+            return "This recording has no ground truth, so there are no errors to show."
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation))
         if errors is None or not np.isfinite(errors.position_m[frame]):
             return ""
@@ -133,7 +134,6 @@ class FramePanel:
     def _render_timeline(self, state: AppState, key: str | None) -> None:
         errors = self._data.errors(state.recording, key)
         content = timeline_html(
-            state.recording,
             self._data.trajectory(state.recording, key),
             self._data.scores(state.recording, key),
             None if errors is None else errors.position_m,
@@ -169,8 +169,3 @@ class FramePanel:
 
     def _frame(self) -> int:
         return 0 if self._state is None else self._state.frame
-
-    def _show(self, frame: int) -> None:
-        if self._state is not None:
-            last = len(self._data.recording(self._state.recording)) - 1
-            self._dispatch(ShowFrame(min(max(frame, 0), last)))
