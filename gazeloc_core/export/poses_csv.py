@@ -1,8 +1,9 @@
 """Aligned poses as CSV: one row for every frame of the recording, its pose empty where it has none.
 
 Poses are `scan_from_camera` (x right, y down, z forward): the translation is the camera centre on the scan in metres,
-the quaternion turns camera axes into scan axes. `mark` and `note` are what people said about the frame,
-`agreement` (0 to 1) how well it agrees with the scan seen from its pose.
+the quaternion turns camera axes into scan axes. `status` is how the frame came by it: `registered`, `tracked`,
+`tag_only` (measured), `interpolated` (not measured), `rejected` or `none` (no pose). `mark` and `note` are what people
+said about the frame, `agreement` (0 to 1) how well it agrees with the scan seen from its pose.
 """
 
 from __future__ import annotations

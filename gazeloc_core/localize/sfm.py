@@ -22,7 +22,7 @@ class LocalizeSfmOptions:
     """Which frames between registered ones get a pose."""
 
     max_gap_s: float = 1.0
-    """Frames are interpolated between two registered ones no further apart than this, in seconds."""
+    """Frames are interpolated between two measured ones no further apart than this, in seconds."""
 
 
 def localize_sfm(
@@ -40,8 +40,9 @@ def localize_sfm(
     - `tracked`: none has, but a piece's points were carried there and its pose was measured from them.
     - `interpolated`: neither, but the nearest such frames before and after are of one piece and at most `max_gap_s`
       apart.
-    - `none`: all others. A keyframe that the reconstruction was given and could not register is among them: it was
-      tried and failed, which speaks against the motion around it being simple, so it is never filled in.
+    - `none`: all others. A keyframe that the reconstruction was given and could not register, and that was not tracked
+      either, is among them: it was tried and failed, which speaks against the motion around it being simple, so it is
+      never filled in.
 
     Raises:
         GeometryError: if a piece's images are not of this recording, or two of one piece are of the same frame.
