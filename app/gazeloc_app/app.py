@@ -36,6 +36,7 @@ from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.live_alignment import LiveAlignment
 from gazeloc_app.keypoints.loupe import add_loupe_route
 from gazeloc_app.looks import Look
+from gazeloc_app.newest import Newest
 from gazeloc_app.panels.all import Desk, Panels
 from gazeloc_app.panels.help import HelpPanel
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
@@ -176,7 +177,7 @@ class App:
             state=self.store.state,
             dispatch=self.store.dispatch,
             browser=lambda client_id: self._browsers.get(client_id),
-            open_recording=self._open_recording,
+            open_recording=Newest(self._open_recording, "gazeloc-open").ask,
             toggle_look=self._toggle_look,
             export_folder=self.export_folder,
         )
@@ -233,6 +234,7 @@ class App:
         return EVERYTHING if browser is None else browser.kept
 
     def _open_recording(self, name: str) -> None:
+        """Reads the recording's files, so not for viser's loop."""
         try:
             self.project.recording(name)
             self.data.recording(name)

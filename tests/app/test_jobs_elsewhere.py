@@ -1,7 +1,9 @@
 """Another recording is looked at while a job is about the first: the job's end disturbs nothing that is shown."""
 
+import asyncio
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from app_project import make_app_project
@@ -18,6 +20,7 @@ from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.state import Level
 from gazeloc_app.work import tasks
+from viser import _messages
 
 from gazeloc_core import pipeline
 from gazeloc_core.project import Project
@@ -208,6 +211,25 @@ class TestTheTableOfStages:
         assert "Looking through the files of sit" in app.panels.of(ProjectPanel)._stages.content
         gate.set()
         assert "Choose keyframes" in self.table(app)
+
+
+def test_choosing_a_recording_that_is_slow_to_read_holds_no_page_up(app, monkeypatch):
+    gate, plain = threading.Event(), app.data.recording
+    monkeypatch.setattr(app.data, "recording", lambda name: [gate.wait(20), plain(name)][1])
+    dropdown = app.panels.of(ProjectPanel)._recording
+    app.server.gui._resolve_client = lambda client_id: SimpleNamespace(client_id=client_id)
+    message = _messages.GuiUpdateMessage(dropdown._impl.uuid, {"value": "sit"})
+    begun_s = time.monotonic()
+    asyncio.run(app.server.gui._handle_gui_updates(7, message))
+    assert time.monotonic() - begun_s < 5
+    app.store.step()
+    assert app.store.state.recording == "walk"
+    gate.set()
+    end_s = time.monotonic() + 20
+    while app.store.state.recording != "sit":
+        assert time.monotonic() < end_s
+        time.sleep(0.02)
+        app.store.step()
 
 
 class TestWorkForTheNewestWish:
