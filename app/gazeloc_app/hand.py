@@ -112,7 +112,7 @@ class Hand:
         reach.dispatch(MovePoint(query.get("key", ""), (x, y, z)))
 
     def _nudge_click(self, state: AppState, pair: KeypointPair, nudge: Nudge) -> list[Action]:
-        target = self._reach.looking.target
+        target = self._reach.looking.pictured
         if target is not None:
             side, frame = target.side, target.frame
         elif self._in_panel is not None and self._in_panel == state.frame:

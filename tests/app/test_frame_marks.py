@@ -116,3 +116,22 @@ def test_a_frame_that_cannot_be_looked_through_is_said_once_while_the_slider_sta
     step(app, ShowFrame(2))
     looking.follow(app.store.state)
     assert looking.target == Target("walk", 2)
+
+
+def test_a_view_that_does_not_follow_stays_and_one_without_the_picture_takes_clicks_on_the_scan(app):
+    client = MagicMock()
+    client.camera.image_width, client.camera.image_height = 800, 600
+    looking = Looking(client, app.data, app._render, lambda: app.store.state, app.store.dispatch)
+    looking.look(0)
+    looking.follows = False
+    step(app, ShowFrame(2))
+    looking.follow(app.store.state)
+    assert looking.target == Target("walk", 0)
+    assert looking.pose_and_camera(app.store.state)[0] is not None
+    looking.show_picture(False)
+    assert (looking.pictured, looking.pose_and_camera(app.store.state)) == (None, (None, None))
+    looking.follows = True
+    looking.follow(app.store.state)
+    assert (looking.target, looking.pictured) == (Target("walk", 2), None)
+    looking.show_picture(True)
+    assert looking.pictured == Target("walk", 2)

@@ -30,7 +30,7 @@ UPRIGHT = np.array([0.5**0.5, -(0.5**0.5), 0.0, 0.0])
 @pytest.fixture
 def hand(app):
     """A hand whose actions are applied at once."""
-    hand = SimpleNamespace(target=None, in_cloud=False, moves=False, snaps=True)
+    hand = SimpleNamespace(pictured=None, in_cloud=False, moves=False, snaps=True)
     client = SimpleNamespace(camera=SimpleNamespace(wxyz=UPRIGHT))
     hand.it = Hand(
         Reach(
@@ -169,7 +169,7 @@ def test_in_a_frame_that_is_looked_through_arrows_move_the_click(app, hand):
     before = pairs(app)
     hand.it.nudge(Nudge((1, 0)))
     assert pairs(app) == before  # nothing of it is on the screen
-    hand.target = Target("walk", 0)
+    hand.pictured = Target("walk", 0)
     hand.it.nudge(Nudge((1, 0)))
     assert pairs(app)[0].sightings[0].x_px == pytest.approx(pixel_of(app, 0)[0] + 1)
 

@@ -48,6 +48,15 @@ class Looking:
         self._picture = FrameInSceneLayer(client.scene)
         self.target: Target | None = None
         """What is looked through now; None for the room from outside."""
+        self.follows = True
+        """Whether the view goes on with the frame."""
+        self.shows_picture = True
+        """Whether the frame's picture stands before the view; without it the scan is seen from where the camera was."""
+
+    @property
+    def pictured(self) -> Target | None:
+        """The frame whose picture is before the view, so that clicks are in it; None where clicks are on the scan."""
+        return self.target if self.shows_picture else None
 
     def look(self, frame: int) -> None:
         """Put this browser's camera where the frame's camera was, with the frame's picture before it."""
@@ -79,9 +88,20 @@ class Looking:
         self.target = None
         self._picture.show(None, None, None)
 
-    def follow(self, state: AppState) -> None:
-        """Go on to the frame of the slider while looking through a camera of the recording."""
+    def show_picture(self, is_on: bool) -> None:
+        """Put the picture before the view, or take it away; the view stays at the camera."""
+        self.shows_picture = is_on
         at = self.target
+        if not is_on:
+            self._picture.show(None, None, None)
+        elif at is not None and at.recording is None:
+            self.look_with_phone(at.frame)
+        elif at is not None:
+            self.look(at.frame)
+
+    def follow(self, state: AppState) -> None:
+        """Go on to the frame of the slider while looking through a camera of the recording, where that is wanted."""
+        at = self.target if self.follows else None
         is_elsewhere = at is not None and at.side is Side.SFM and at != Target(state.recording, state.frame)
         if is_elsewhere and self._any_pose(state, state.frame) is not None:  # frames without a pose are passed over
             self.look(state.frame)
@@ -98,8 +118,8 @@ class Looking:
         return trajectory.pose(frame) if trajectory is not None and frame < len(trajectory) else None
 
     def pose_and_camera(self, state: AppState) -> tuple[RigidTransform | None, Camera | None]:
-        """Where the camera that is looked through stands (`scan_from_camera`), and the camera; None where unknown."""
-        at = self.target
+        """Where the camera whose picture is looked through stands (`scan_from_camera`), and it; None without."""
+        at = self.pictured
         if at is None:
             return None, None
         if at.recording is None:
@@ -117,7 +137,7 @@ class Looking:
             self._client.camera.position = view.position
 
         def paste(image: Any) -> None:
-            if self.target == target:
+            if self.pictured == target:
                 self._picture.show(pose, camera, image)
 
         future = self._render.submit(job, key=f"look {self._client.client_id}")

@@ -52,6 +52,20 @@ class LookingControls:
             hint="Of the selected keypoint: goes to the next frame in whose picture it is, and nothing hides it.",
         )
         self._leave = gui.add_button("Leave the frame", visible=False, color="gray", hint="Back into the room.")
+        self._picture = gui.add_checkbox(
+            "Its picture",
+            True,
+            visible=False,
+            hint="The frame's picture before the view. Without it clicks are on the scan.",
+        )
+        self._follow = gui.add_checkbox(
+            "Follow the trajectory",
+            True,
+            visible=False,
+            hint="In this browser: the view goes on with the frame, also while it plays. Off, it stays at this frame.",
+        )
+        widgets.on_user(self._picture, lambda event: self._show_picture(bool(event.target.value)))
+        widgets.on_user(self._follow, lambda event: self._go_along(bool(event.target.value)))
         widgets.on_user(self._phone, lambda event: self._show_phone(int(event.target.value)))
         widgets.on_user(self._next, lambda _: self._go_on(), event="on_click")
         widgets.on_user(self._leave, lambda _: self.leave(), event="on_click")
@@ -65,12 +79,15 @@ class LookingControls:
         """Show what fits what is looked through, and the keypoints in it."""
         target = self._looking.target
         widgets.set_property(self._leave, "visible", target is not None)
+        widgets.set_property(self._picture, "visible", target is not None)
+        widgets.set_property(self._follow, "visible", target is not None and target.side is Side.SFM)
         selected = (
             state.selected_key if state.selected_key and state.annotation.keypoints.get(state.selected_key) else None
         )
         widgets.set_property(self._next, "visible", selected is not None)
         if target is not None and target.side is Side.SCAN:
             widgets.set_value(self._phone, target.frame)
+        target = self._looking.pictured
         drawn = (target, state.annotation.keypoints, state.annotation.alignment, selected, state.data_revision)
         if drawn != self._drawn:
             self._drawn = drawn
@@ -82,6 +99,15 @@ class LookingControls:
             return
         view = view_of(self._data, state, target.side, target.frame)
         self._marks.show(view, *marks_in_frame(self._data, state, target.side, target.frame), selected)
+
+    def _show_picture(self, is_on: bool) -> None:
+        self._looking.show_picture(is_on)
+        self.render(self._state())
+
+    def _go_along(self, is_on: bool) -> None:
+        self._looking.follows = is_on
+        self._looking.follow(self._state())
+        self.render(self._state())
 
     def _show_phone(self, frame: int) -> None:
         if 0 <= frame < len(self._data.scan().frames_with_images):

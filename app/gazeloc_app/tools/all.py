@@ -21,4 +21,4 @@ def shifted(tool: Tool, tools: dict[str, Tool]) -> Tool:
     """What a click with the shift key uses: always a tool that sets a point, so that no mode has to be left for it."""
     if not isinstance(tool, CameraTool | TapeTool):
         return tool
-    return tools[ScanPointTool.name if tool.bench.looking.target is None else FramePointTool.name]
+    return tools[ScanPointTool.name if tool.bench.looking.pictured is None else FramePointTool.name]

@@ -19,7 +19,7 @@ class FramePointTool(Tool):
     def click(self, click: Click) -> Action:
         """The pixel under the click, a tag's corner near it, and what the pair's clicks on that side triangulate to."""
         bench, state = self.bench, self.bench.state()
-        target = bench.looking.target
+        target = bench.looking.pictured
         if target is None:
             return Notify(
                 Level.INFO,
