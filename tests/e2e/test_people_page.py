@@ -86,6 +86,14 @@ def test_two_people_see_each_others_names_and_keypoints_and_keep_their_own_camer
     still = second.viewer.project(CORNERS)
     orbit(first.viewer)
     assert np.abs(second.viewer.project(CORNERS) - still).max() < 0.01
+    second.viewer.wait_for_node("/people/1")
+    there = rest(first.viewer)
+    second.viewer.save("people-onlooker")
+    second.page.get_by_title("Go to what Anna <b> sees").click()
+    second.viewer.wait_until(lambda: np.abs(rest(second.viewer) - there).max() < 1.5)
+    second.viewer.wait_for_node("/people/1", present=False)  # now at the same place
+    first.choose("A click", tool_names(first)[-1])
+    second.page.locator(".gazeloc-person").get_by_text(tool_names(first)[-1]).wait_for()
     first.app.store.dispatch(PickPoint(Side.SCAN, (1.5, 0.0, 1.9)))
     for page in (first, second):
         page.viewer.wait_for_node("/keypoints/k1/scan")
@@ -151,7 +159,14 @@ def test_a_job_goes_on_without_a_page_and_one_that_waits_can_be_taken_off(open_a
         page.app.store.dispatch(action)
     page.page.get_by_text("waits: Export").wait_for()
     page.viewer.save("people-jobs")
-    page.page.get_by_label("Take off Export").click()
+    button = page.page.get_by_label("Take off Export").bounding_box()
+    page.page.mouse.move(button["x"] + button["width"] / 2, button["y"] + button["height"] / 2)
+    page.page.mouse.down()
+    page.app.store.dispatch(StartJob("Refine", tasks.refine, (*WALK, ("start", "c0ffee"))))
+    page.page.get_by_text("waits: Refine").wait_for()  # the list is made anew between press and release
+    page.page.mouse.up()
+    page.viewer.wait_until(lambda: [job.name for job in page.state.waiting_jobs] == ["Refine"])
+    page.page.get_by_label("Take off Refine").click()
     page.viewer.wait_until(lambda: not page.state.waiting_jobs)
     page.page.close()
     (page.app.project.folder / job_tasks.GO).touch()
