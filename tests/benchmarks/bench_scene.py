@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from bench_alignment import scene as scene_case
 from gazeloc_core import pipeline
 from gazeloc_core.arrays import Floats
 from gazeloc_core.evaluate import evaluate
+from gazeloc_core.gaze import cast_gaze
 from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import stage_named
@@ -20,6 +22,7 @@ from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.poses import placed_models
 from gazeloc_core.stages.recording import load_keyframes
+from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.truth import read_tum
 
 Row = tuple[str, str, bool]
@@ -51,10 +54,10 @@ def bench_scene(scene: Path, work: Path) -> list[Row]:
     stages = [
         (f"    {time.title}", f"{time.seconds:.1f} s, {100 * time.seconds / total:.0f} %", True) for time in times
     ]
-    return rows + _between_rows(project, times) + stages + _alignment_rows(project) + _shipped_rows(scene)
+    return rows + _between_rows(project, scene, times) + stages + _alignment_rows(project) + _shipped_rows(scene)
 
 
-def _between_rows(project: Project, times: list[pipeline.StageTime]) -> list[Row]:
+def _between_rows(project: Project, scene: Path, times: list[pipeline.StageTime]) -> list[Row]:
     """All frames but the keyframes: tracked as they are now, and the same ones interpolated as without tracking."""
     recording, keyframes = inputs.load_recording(project, "glasses"), load_keyframes(project, "glasses")
     placed = placed_models(project, "glasses", Method.SFM)
@@ -70,13 +73,14 @@ def _between_rows(project: Project, times: list[pipeline.StageTime]) -> list[Row
         errors[name] = of_frame[:, trajectory.status == name]
     (position, rotation), between = errors["tracked"], int((~tracked.is_registered).sum())
     share = len(position) / between
+    gaze_m = {name: _gaze_errors_m(project, scene, of) for name, of in (("now", tracked), ("before", before))}
     seconds = sum(time.seconds for time in times if time.title == stage_named("tracking").title)
     per_frame = 1000 * seconds / len(recording)
     return [
         (
             "frames between keyframes: mean error of tracked ones (<= 1.2 cm, <= 0.35°)",
             _spread_text(position, rotation),
-            position.mean() <= 0.012 and rotation.mean() <= 0.35,
+            bool(position.mean() <= 0.012 and rotation.mean() <= 0.35),
         ),
         ("    the same frames interpolated, as without tracking", _spread_text(*errors["interpolated"]), True),
         ("frames between keyframes: tracked (>= 95 %)", f"{len(position)} of {between}", share >= 0.95),
@@ -85,7 +89,29 @@ def _between_rows(project: Project, times: list[pipeline.StageTime]) -> list[Row
             f"{per_frame:.0f} ms",
             per_frame <= 60,
         ),
+        (
+            "gaze on the scan against where the wearer looked, by these poses: median (<= 4 cm)",
+            "{:.1f} cm, p95 {:.1f} cm".format(*(100 * np.percentile(gaze_m["now"], share) for share in (50, 95))),
+            bool(np.median(gaze_m["now"]) <= 0.04),
+        ),
+        (
+            "    by interpolated poses",
+            "{:.1f} cm, p95 {:.1f} cm".format(*(100 * np.percentile(gaze_m["before"], share) for share in (50, 95))),
+            True,
+        ),
     ]
+
+
+def _gaze_errors_m(project: Project, scene: Path, trajectory: Trajectory) -> Floats:
+    """How far hits (M,) are from the true ones, of samples that have both."""
+    with (scene / "truth" / "gaze3d.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    columns = [name for name in rows[0] if name.startswith("hit")]
+    truth = {int(row["timestamp [ns]"]): [float(row[name] or "nan") for name in columns] for row in rows}
+    gaze = cast_gaze(inputs.load_recording(project, "glasses"), trajectory, inputs.load_raycaster(project))
+    known = [i for i in np.flatnonzero(gaze.is_hit) if int(gaze.timestamp_ns[i]) in truth]
+    errors = np.linalg.norm(gaze.hit[known] - [truth[int(gaze.timestamp_ns[i])] for i in known], axis=1)
+    return errors[np.isfinite(errors)]
 
 
 def _spread_text(position_m: Floats, rotation_deg: Floats) -> str:
