@@ -1,5 +1,7 @@
 """Frames between images are measured, or say that they were not: laws on a room whose every pose is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from painted_room import LENS, SFM_FROM_ROOM, Pictures, head_poses, model_of, picture, recording_of
@@ -11,7 +13,7 @@ from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.localize.stretches import stretches
 from gazeloc_core.localize.track_evidence import EvidenceOptions, KnownPose, Refusal, refusal
 from gazeloc_core.localize.track_points import spread
-from gazeloc_core.localize.tracking import TrackingOptions, track_frames
+from gazeloc_core.localize.tracking import TrackingOptions, joined, track_frames, track_stretches
 from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.transforms import rotation_angle_rad
 
@@ -127,17 +129,30 @@ def test_points_reach_no_further_than_they_are_told():
 def test_a_model_without_observations_tracks_nothing():
     poses = head_poses(6)
     model = model_of(poses, [0, 5])
-    bare = type(model)(
-        **{
-            **model.__dict__,
-            "observation_point": np.zeros(0, int),
-            "observation_image": np.zeros(0, int),
-            "observation_px": np.zeros((0, 2)),
-        }
-    )
+    nothing = np.zeros(0, int)
+    bare = replace(model, observation_point=nothing, observation_image=nothing, observation_px=np.zeros((0, 2)))
     tracking = track_frames(bare, recording_of(Pictures(poses)), taken([0, 5], 6))
     assert len(tracking.tracked) == 0
     assert tracking.refused == {Refusal.LOST: 4}
+
+
+@pytest.mark.parametrize("frames_of_images", [[0, 1, 2, 3], [-1, -1, -1, -1]])
+def test_where_there_is_nothing_between_nothing_is_read(frames_of_images):
+    poses = head_poses(4)
+    frames = Pictures(poses)
+    model = replace(model_of(poses, [0, 1, 2, 3]), frame_indices=np.array(frames_of_images))
+    tracking = track_frames(model, recording_of(frames), np.isin(np.arange(4), frames_of_images))
+    assert tracking.tried == len(tracking.tracked) == 0
+    assert not frames.read_frames
+
+
+def test_stretches_are_tracked_one_by_one_and_some_may_be_left_out(walk):
+    poses, tracking, _ = walk
+    frames = Pictures(poses)
+    rest = joined(track_stretches(model_of(poses, IMAGES), recording_of(frames), taken(IMAGES), skip=3))
+    later = tracking.tracked.frame_indices > IMAGES[2]
+    np.testing.assert_array_equal(rest.tracked.centers, tracking.tracked.centers[later])
+    assert min(frames.read_frames) == IMAGES[2]
 
 
 def test_it_can_be_cancelled_at_any_frame():
