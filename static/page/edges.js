@@ -1,7 +1,7 @@
 // Where a picture's brightness changes most, in a colour that rooms seldom have.
 window.gazelocEdges = (() => {
   const WIDTH = 700;
-  const COLOR = [255, 0, 200, 230];
+  const PINK = 0xe6c800ff; // opacity, blue, green, red: a pixel as one number, lowest byte first
   const SHARE = 0.07; // of all pixels are edges
   const LEAST = 6; // a change in grey levels below which nothing is one
 
@@ -14,8 +14,8 @@ window.gazelocEdges = (() => {
     pen.drawImage(image, 0, 0, width, height);
     const pixels = pen.getImageData(0, 0, width, height);
     const steep = steepness(pixels.data, width, height);
-    const limit = steepest(steep);
-    for (let i = 0; i < steep.length; i++) pixels.data.set(steep[i] > limit ? COLOR : [0, 0, 0, 0], 4 * i);
+    const limit = steepest(steep), out = new Uint32Array(pixels.data.buffer);
+    for (let i = 0; i < out.length; i++) out[i] = steep[i] > limit ? PINK : 0;
     pen.putImageData(pixels, 0, 0);
   }
 

@@ -55,7 +55,6 @@ class Pictures:
 
         With `lens=1` through the lens as it is, distortion and all.
         """
-        self._data.project.recording(recording)
         if not _KEY.fullmatch(query.get("rev", "")):
             raise InputError("A render is of poses, which `rev` names.")
         trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._camera(recording, query)
