@@ -17,7 +17,7 @@ from gazeloc_core.arrays import Ints
 from gazeloc_core.colmap_io import write_model
 from gazeloc_core.errors import InputError
 from gazeloc_core.export.files import move_all, staging_folder
-from gazeloc_core.frame_notes import COLUMNS, FrameNotes
+from gazeloc_core.frame_notes import HEADINGS, FrameNotes
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
 
 MARKER = "gazeloc.txt"
@@ -70,7 +70,7 @@ def _notes_table(models: Sequence[SfmModel], rows: Sequence[Ints], notes: FrameN
     """A row of every image that is written, with its frame in the recording and what is known of that."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(["image name", "frame index", *COLUMNS])
+    table.writerow(["image name", "frame index", *HEADINGS])
     for model, row in zip(models, rows, strict=True):
         for i in row.tolist():
             frame = int(model.frame_indices[i])

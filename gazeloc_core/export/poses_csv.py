@@ -2,8 +2,9 @@
 
 Poses are `scan_from_camera` (x right, y down, z forward): the translation is the camera centre on the scan in metres,
 the quaternion turns camera axes into scan axes. `status` is how the frame came by it: `registered`, `tracked`,
-`tag_only` (measured), `interpolated` (not measured), `rejected` or `none` (no pose). `mark` and `note` are what people
-said about the frame, `agreement` (0 to 1) how well it agrees with the scan seen from its pose.
+`tag_only` (measured), `interpolated` (not measured), `rejected` or `none` (no pose).
+`mark` and `note` are what people said about the frame, `agreement` (0 to 1) how well it agrees with the scan seen from
+its pose, `shift` and `turn` how far off the camera looks, each with its standard deviation.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ import io
 from pathlib import Path
 
 from gazeloc_core.export.files import starts_with, write_text_export
-from gazeloc_core.frame_notes import COLUMNS, FrameNotes
+from gazeloc_core.frame_notes import HEADINGS, FrameNotes
 from gazeloc_core.trajectory import Trajectory
 
 _POSES_HEADER = "timestamp [ns],frame index,status,tx [m],ty [m],tz [m],qw,qx,qy,qz"
 """Files of earlier versions have these columns alone."""
-HEADER = ",".join([_POSES_HEADER, *COLUMNS])
+HEADER = ",".join([_POSES_HEADER, *HEADINGS])
 
 
 def write_poses_csv(

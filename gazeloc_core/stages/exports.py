@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -106,7 +107,8 @@ def _nerfstudio(project: Project, recording: str, method: Method, folder: Path, 
 def _notes(project: Project, recording: str, method: Method) -> FrameNotes:
     """People's marks, and the scores of these very poses where there are any."""
     scores = fresh_scores(project, recording, method)
-    return FrameNotes(project.marks(recording), None if scores is None else scores.score)
+    columns = {} if scores is None else {"agreement": scores.score, **asdict(scores)}
+    return FrameNotes(project.marks(recording), columns)
 
 
 FORMATS: dict[str, Callable[[Project, str, Method, Path, Report], list[Path]]] = {

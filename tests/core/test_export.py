@@ -60,7 +60,8 @@ def test_tracked_frames_are_exported_as_such_but_training_sees_keyframes_alone(t
 def test_poses_csv_has_every_frame_and_poses_only_where_there_are(tmp_path):
     assert write_poses_csv(make_trajectory(), tmp_path / "poses.csv") == [tmp_path / "poses.csv"]
     table = pd.read_csv(tmp_path / "poses.csv")
-    expected = "timestamp [ns],frame index,status,tx [m],ty [m],tz [m],qw,qx,qy,qz,mark,note,agreement"
+    expected = "timestamp [ns],frame index,status,tx [m],ty [m],tz [m],qw,qx,qy,qz,mark,note,agreement,"
+    expected += "shift [m],shift sigma [m],turn [deg],turn sigma [deg]"
     assert ",".join(table.columns) == expected
     assert table[["mark", "note", "agreement"]].isna().all(axis=None)
     assert table["timestamp [ns]"].tolist() == TIMES.tolist()

@@ -101,11 +101,17 @@ def test_readers_that_know_nothing_of_marks_still_read_the_files(tmp_path, proje
 
 
 def test_the_agreement_is_exported_while_it_is_of_these_poses(tmp_path, project):
-    scores = score(project, "walk").score
+    found = score(project, "walk")
+    scores = found.score
     for format in ("csv", "nerfstudio", "colmap"):
         export(project, format=format, output=tmp_path / format, recording="walk")
     table = pd.read_csv(tmp_path / "csv" / "poses.csv")
-    np.testing.assert_allclose(table["agreement"], scores, atol=1e-4)
+    for column, expected in (
+        ("agreement", scores),
+        ("shift [m]", found.shift_m),
+        ("turn sigma [deg]", found.turn_sigma_deg),
+    ):
+        np.testing.assert_allclose(table[column], expected, atol=1e-4)
     frames = json.loads((tmp_path / "nerfstudio" / "transforms.json").read_text())["frames"]
     assert {f["frame_index"]: f["agreement"] for f in frames} == {
         f["frame_index"]: pytest.approx(scores[f["frame_index"]], abs=1e-4) for f in frames
@@ -119,7 +125,7 @@ def test_the_agreement_is_exported_while_it_is_of_these_poses(tmp_path, project)
 
 
 def test_an_image_of_no_frame_has_no_notes():
-    assert FrameNotes(marked((4, Mark.BAD, NOTE)), np.full(6, 0.5)).cells(-1) == ["", "", ""]
+    assert set(FrameNotes(marked((4, Mark.BAD, NOTE)), {"agreement": np.full(6, 0.5)}).cells(-1)) == {""}
 
 
 def test_frames_marked_bad_can_be_left_out_of_an_evaluation(project):
