@@ -1,4 +1,4 @@
-// While the view moves and a frame takes long, a quarter of the lines and points is drawn; all again when it rests.
+// While the view moves and a frame takes long, a tenth of the lines and points is drawn; all again when it rests.
 // While the page loads there are none, so that what is still to come does not wait for frames that nobody looks at.
 // The server sends both in a shuffled order, so that any first part of them is spread evenly.
 (function spareDetail() {
@@ -11,9 +11,8 @@
   const SLOW_MS = 90;
   const FAST_MS = 20;
   const REST_MS = 250;
-  const PAUSE_MS = 2500;
-  const SHARE = 0.25;
-  const LOADED_MS = 200;
+  const PAUSE_MS = 6000; // the slowest machines take seconds for a frame
+  const SHARE = 0.1;
   const before = scene.onBeforeRender;
   let seen = "";
   let movedAt = 0;
@@ -21,7 +20,6 @@
   let pace = 0;
   let rest = 0;
   let isLoading = true;
-  let nodes = 0;
 
   function draw(share) {
     for (const [name, node] of Object.entries(viewer.nodeRefFromName)) {
@@ -37,7 +35,6 @@
   }
 
   function settle() {
-    isLoading = false;
     draw(1);
     viewer.requestRender();
   }
@@ -49,12 +46,9 @@
     const moves = view !== seen && seen !== "";
     seen = view;
     if (isLoading) {
-      const count = Object.keys(viewer.nodeRefFromName).length;
-      draw(0);
-      if (count === nodes) return;
-      nodes = count;
-      clearTimeout(rest);
-      rest = setTimeout(settle, LOADED_MS);
+      isLoading = !window.gazelocScene.isComplete();
+      draw(isLoading ? 0 : 1);
+      if (!isLoading) setTimeout(window.gazelocScene.release, 0); // once this frame is on its way
       return;
     }
     if (!moves) return;

@@ -43,9 +43,11 @@ def open_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Call
     """Opens pages, each in a profile of its own; keeps screenshots of a failed test, and fails on page errors."""
     opened: list[ViewerPage] = []
 
-    def open_page(address: str, **size: int) -> ViewerPage:
+    def open_page(address: str, *, script: str = "", **size: int) -> ViewerPage:
+        """`script` runs in the page before its own."""
         context = browser.new_context(viewport=SIZE | size, device_scale_factor=1)
         opened.append(ViewerPage(context.new_page()))
+        opened[-1].page.add_init_script(script)
         return opened[-1].open(address)
 
     yield open_page
