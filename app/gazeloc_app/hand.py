@@ -23,7 +23,7 @@ from gazeloc_app.frames.sightings import frame_pose
 from gazeloc_app.keypoints.loupe import loupe_view, place_from_text
 from gazeloc_app.keypoints.picking import pick_mesh
 from gazeloc_app.keypoints.snapping import NEAR_PX
-from gazeloc_app.moving import Nudge, nudged, nudged_in_view
+from gazeloc_app.moving import ARROWS, Nudge, nudge_of, nudged, nudged_in_view
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.arrays import Floats
@@ -68,13 +68,19 @@ class Hand:
         state = self._reach.state()
         pair = self._selected(state)
         if pair is None:
-            self._say("Select a keypoint; arrows move it.")
-            return
+            return  # arrows turn the view
         for actions in (self._nudge_click(state, pair, nudge), self._nudge_place(state, pair, nudge)):
             if actions:
                 self._do(actions)
                 return
         self._say("The selected keypoint has no place here that arrows could move; click one first.")
+
+    def press_arrow(self, query: Mapping[str, str]) -> None:
+        """`key`, one of `moving.ARROWS`, with `shift=1` or not: a page's arrow key."""
+        key = query.get("key", "")
+        if key not in ARROWS:
+            raise InputError(f"{key[:20]!r} is no arrow key.")
+        self.nudge(nudge_of(key, is_shifted=query.get("shift") == "1"))
 
     def click_in_frame(self, query: Mapping[str, str]) -> None:
         """`frame`, `u`, `v`: a click in the picture of a frame of the recording, `across` pixels wide on the screen.
@@ -87,7 +93,9 @@ class Hand:
             raise InputError(f"There is no frame {frame} to click in.")
         pixel = self._pixel(query, camera)
         self._in_panel = frame
-        if "key" in query:
+        if pixel is None:
+            self._say("The undistorted frame does not have that part; click nearer to the middle.")
+        elif "key" in query:
             self._do(self._place_click(state, query["key"], frame, pixel))
         elif frame_pose(reach.data, state, frame) is None:
             self._say(f"Frame {frame} is not in the reconstruction, so a click in it says no place; go to a keyframe.")
@@ -148,16 +156,14 @@ class Hand:
             return [Notify(Level.INFO, text)]
         return clicked_in_frame(self._reach.data, state, Side.SFM, frame, pixel, moves=self._reach.moves())
 
-    def _pixel(self, query: Mapping[str, str], camera: Camera) -> Floats:
-        """The pixel (2,) of the undistorted frame that `u` and `v` say."""
+    def _pixel(self, query: Mapping[str, str], camera: Camera) -> Floats | None:
+        """The pixel (2,) of the undistorted frame that `u` and `v` say; None for one that it does not have."""
         u, v = (_number(query, name, 0.0, 1.0) for name in "uv")
         if query.get("lens") != "1":
             return np.array([u * camera.width, v * camera.height])
         lens = self._reach.data.recording(self._reach.state().recording).camera
         pixel = camera.project(lens.unproject([[u * lens.width, v * lens.height]]))
-        if not camera.contains(pixel)[0]:
-            raise InputError("That part of the frame is not in the undistorted one.")
-        return np.asarray(pixel[0])
+        return np.asarray(pixel[0]) if camera.contains(pixel)[0] else None
 
     def _selected(self, state: AppState) -> KeypointPair | None:
         return state.annotation.keypoints.get(state.selected_key) if state.selected_key else None

@@ -29,6 +29,12 @@ class Nudge(NamedTuple):
     step_px: float = STEP_PX
 
 
+def nudge_of(key: str, *, is_shifted: bool) -> Nudge:
+    """What an arrow key means: 2 mm or a pixel, with the shift key 1 cm or a tenth of a pixel."""
+    steps = (LONG_STEP_M, FINE_STEP_PX) if is_shifted else (STEP_M, STEP_PX)
+    return Nudge(ARROWS[key], *steps)
+
+
 def nudged(raycaster: Raycaster, point: Point, nudge: Nudge, camera_wxyz: Floats) -> Point:
     """The place on the surface a nudge beside a point.
 

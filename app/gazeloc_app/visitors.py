@@ -53,6 +53,7 @@ class Visitors:
             "name": self._name,
             "go-to-person": self._go_to_person,
             "cancel-job": lambda _, query: self._dispatch(CancelJob(_number(query, "number"))),
+            "arrow": lambda visit, query: visit.browser.hand.press_arrow(query),
             "frame-click": lambda visit, query: visit.browser.hand.click_in_frame(query),
             "loupe-click": lambda visit, query: visit.browser.hand.click_in_loupe(query),
             "go-to-step": lambda _, query: self._dispatch(GoToStep(_number(query, "step"), _number(query, "count"))),

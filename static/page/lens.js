@@ -1,5 +1,6 @@
 // The lens: what is around the pointer, enlarged, wherever a click sets a point. In the 3D view that is while Shift is
 // held or a tool that aims is in hand (the server's <div id="gazeloc-tool" data-aims>), in the panel's frame with Shift.
+// It is there too while a marker is dragged in the 3D view, which viser keeps still meanwhile.
 // It copies pixels that the page has already: those of the drawn view, or of the frame's own picture, which has more
 // than the panel shows.
 window.gazelocLens = (function lens() {
@@ -17,6 +18,11 @@ window.gazelocLens = (function lens() {
 
   function aims() {
     return isShifted || !!document.querySelector("#gazeloc-tool[data-aims]");
+  }
+
+  function drags() {
+    const pointer = window.__viserPointer;
+    return at.buttons === 1 && !!pointer && pointer.cameraLockReasons().length > 0;
   }
 
   // The frame's picture in the panel under a place of the page, with its rectangle; null beside it.
@@ -40,7 +46,7 @@ window.gazelocLens = (function lens() {
     }
     const canvas = view();
     const isOver = canvas && at.target === canvas;
-    if (isOver && aims() && at.buttons === 0) show(canvas, canvas.getBoundingClientRect(), canvas.width);
+    if (isOver && (drags() || (aims() && at.buttons === 0))) show(canvas, canvas.getBoundingClientRect(), canvas.width);
     else hide();
   }
 
@@ -95,7 +101,7 @@ window.gazelocLens = (function lens() {
   function note(event) {
     Object.assign(at, { x: event.clientX, y: event.clientY, target: event.target, buttons: event.buttons });
     isShifted = event.shiftKey;
-    if (isShifted || aims() || (glass && !glass.hidden)) ask();
+    if (isShifted || aims() || drags() || (glass && !glass.hidden)) ask();
   }
 
   for (const kind of ["pointermove", "pointerdown", "pointerup"]) addEventListener(kind, note, true);
@@ -113,7 +119,7 @@ window.gazelocLens = (function lens() {
     isShifted = false;
     hide();
   });
-  document.addEventListener("pointerleave", hide);
+  document.documentElement.addEventListener("pointerleave", hide);
 
   // While a click in a frame is dragged the lens stays, Shift or not.
   function hold(on) {

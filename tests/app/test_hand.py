@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -12,11 +13,13 @@ from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowFrame
+from gazeloc_app.frames.frame_marks import view_of
 from gazeloc_app.frames.frame_snapping import snap_pixel
 from gazeloc_app.frames.looking import Target
 from gazeloc_app.hand import Hand, Reach
 from gazeloc_app.keypoints.loupe import ACROSS_M, loupe_places
 from gazeloc_app.moving import Nudge
+from gazeloc_app.panels.looking import LookingControls
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.tag_types import TagSightings
@@ -159,8 +162,18 @@ def test_arrows_move_the_side_that_the_tool_in_hand_sets(app, hand):
     assert pairs(app)[0].scan == before
     assert 0 < np.linalg.norm(np.array(pairs(app)[0].sfm) - (1, 2, 3)) < 0.01
     step(app, SelectPair(None))
+    before = app.store.state
     hand.it.nudge(Nudge((1, 0)))
-    assert "Select" in app.store.state.notice.text
+    assert app.store.state is before  # they turn the view then
+
+
+def test_a_pages_arrow_key_is_one_of_four(app, hand):
+    step(app, PickPoint(Side.SCAN, RED_MARK))
+    hand.it.press_arrow({"key": "arrowleft", "shift": "1"})
+    assert np.linalg.norm(np.array(pairs(app)[0].scan) - RED_MARK) == pytest.approx(0.01, abs=5e-4)
+    for query in ({}, {"key": "arrow"}, {"key": "up"}):
+        with pytest.raises(InputError):
+            hand.it.press_arrow(query)
 
 
 def test_in_a_frame_that_is_looked_through_arrows_move_the_click(app, hand):
@@ -172,6 +185,32 @@ def test_in_a_frame_that_is_looked_through_arrows_move_the_click(app, hand):
     hand.pictured = Target("walk", 0)
     hand.it.nudge(Nudge((1, 0)))
     assert pairs(app)[0].sightings[0].x_px == pytest.approx(pixel_of(app, 0)[0] + 1)
+
+
+def test_a_click_is_dragged_in_the_picture_that_is_looked_through_as_one_step(app, hand):
+    click(app, hand, 0, pixel_of(app, 0))
+    hand.target = Target("walk", 0)
+    controls = LookingControls(MagicMock(), app.data, hand, lambda: app.store.state, lambda action: step(app, action))
+    view, grip = view_of(app.data, app.store.state, Side.SFM, 0), SimpleNamespace(position=None, opacity=0.0)
+    eye = view.scan_from_camera.translation
+
+    def drag(phase, pixel):
+        ray = view.scan_from_camera.rotation.apply(view.camera.unproject([pixel])[0])
+        camera = SimpleNamespace(position=eye)
+        pointer = eye + 0.7 * ray
+        client = SimpleNamespace(camera=camera)
+        controls._drag("k1", SimpleNamespace(phase=phase, end_position=pointer, client=client, target=grip))
+
+    steps = len(app.store.state.past)
+    for phase, pixel in (("start", (100, 90)), ("update", (110, 92)), ("end", (120.25, 95.5))):
+        drag(phase, pixel)
+    (moved,) = pairs(app)[0].sightings
+    assert (moved.x_px, moved.y_px) == pytest.approx((120.25, 95.5), abs=1e-6)
+    np.testing.assert_allclose(view.pixel_of(grip.position), (110, 92), atol=1e-6)
+    assert len(app.store.state.past) == steps + 1
+    drag("end", (-20, 90))
+    assert pairs(app)[0].sightings == (moved,)
+    assert "beside" in app.store.state.notice.text
 
 
 def test_a_click_near_a_tags_corner_in_a_frame_is_that_corner_and_the_row_says_so(app, hand):

@@ -123,6 +123,8 @@ def test_a_marker_of_the_reconstruction_is_dragged_in_the_view(page):
     mouse.move(*np.add(start, (10, 6)), steps=4)
     mouse.move(*np.add(start, (24, 12)), steps=4)
     page.page.wait_for_timeout(200)
+    mouse.move(*np.add(start, (25, 12)))
+    page.until(lambda: page.page.evaluate(LENS_MIDDLE) is not None)
     mouse.up()
     page.until(lambda: page.pairs[0].sfm != (x, y, z))
     assert len(page.state.past) == 2

@@ -57,8 +57,30 @@ def test_one_spot_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page):
         page.viewer.wait_for_node("/picture-marks/lines")
         page.viewer.save(f"app-phone-{number}")
     assert np.linalg.norm(np.array(page.pairs[0].scan) - SPOT) < 0.02
+    drag_its_mark_in_the_picture(page)
     page.press("Leave the frame")
     page.viewer.wait_for_node("/picture", present=False).wait_for_node("/picture-marks/lines", present=False)
+
+
+def drag_its_mark_in_the_picture(page):
+    click, view = page.pairs[0].scan_sightings[-1], page.app.data.scan().frames_with_images[2]
+    ray = view.camera.unproject([(click.x_px, click.y_px)])[0]
+    at = page.viewer.project(view.scan_from_camera.apply(ray / ray[2] * PLANE_M))[0]
+    page.viewer.wait_for_node("/picture-grips/k1")
+    mouse = page.page.mouse
+    mouse.move(*at)
+    page.page.wait_for_timeout(300)
+    mouse.down()
+    mouse.move(*np.add(at, (8, 0)), steps=4)
+    mouse.move(*np.add(at, (16, 0)), steps=4)
+    page.page.wait_for_timeout(200)
+    page.viewer.save("app-phone-drag")
+    mouse.up()
+    page.until(lambda: page.pairs[0].scan_sightings[-1] != click)
+    moved = page.pairs[0].scan_sightings[-1]
+    assert moved.x_px - click.x_px > 3 * abs(moved.y_px - click.y_px)
+    page.page.keyboard.press("Control+z")
+    page.until(lambda: page.pairs[0].scan_sightings[-1] == click)
 
 
 def test_a_marker_is_dragged_along_the_wall_and_nudged_by_an_arrow(page):
@@ -79,7 +101,9 @@ def test_a_marker_is_dragged_along_the_wall_and_nudged_by_an_arrow(page):
     moved = np.array(page.pairs[0].scan)
     assert abs(moved[1]) < 0.01  # still on the wall
     assert np.linalg.norm(moved - before - (0.4, 0.0, -0.2)) < 0.03
+    view = page.viewer._view()
     page.page.keyboard.press("ArrowUp")
     page.until(lambda: page.pairs[0].scan != tuple(moved.tolist()))
+    assert page.viewer._view() == view  # viser would turn it with the same key
     assert np.linalg.norm(np.array(page.pairs[0].scan) - moved) == pytest.approx(0.002, abs=1e-4)
     page.viewer.save("app-nudged")

@@ -87,14 +87,15 @@ def reason(found: Suggestion, groups: int, up: Floats) -> str:
     """Why to click there, as a sentence; `groups` is the number of places that hold the alignment so far."""
     if groups < 3:
         ordinal = ("first", "second", "third")[groups]
-        return f"A good {ordinal} place: well seen, and far from the others. Three pairs make an alignment."
+        return f"“next?” is a good {ordinal} place: well seen, and far from the others. Three pairs make an alignment."
     left = found.weakness_left
     how_much = f"takes {100 * (1 - left):.0f} % off" if left > 0.55 else "halves" if left > 0.4 else "more than halves"
     numbers = (
         f"cameras {100 * found.cameras_before_m:.1f} → {100 * found.cameras_after_m:.1f} cm, "
         f"rotation {found.rotation_before_deg:.2f} → {found.rotation_after_deg:.2f}°"
     )
-    return f"Here: {how_much} the uncertainty of {_weakest_of(found, up)}; {numbers}."
+    weakest = f"the uncertainty of {_weakest_of(found, up)}, the weakest so far"
+    return f"A keypoint at “next?” {how_much} {weakest}. Expected error: {numbers}."
 
 
 def _weakest_of(found: Suggestion, up: Floats) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
 from gazeloc_app import widgets
@@ -15,9 +16,12 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.data import ProjectData
+from gazeloc_app.frames.frame_clicks import moved_in_frame
 from gazeloc_app.frames.frame_marks import marks_in_frame, next_frame_seeing, view_of
 from gazeloc_app.frames.looking import Looking, Target
-from gazeloc_app.scene.frame_marks import FrameMarksLayer
+from gazeloc_app.keypoints.picking import pixel_in_frame
+from gazeloc_app.scene.frame_marks import FrameMarksLayer, on_plane
+from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_app.state import AppState, Level
 
 
@@ -33,7 +37,7 @@ class LookingControls:
         dispatch: Callable[[Action], None],
     ):
         self._data, self._looking, self._state, self._dispatch = data, looking, state, dispatch
-        self._marks = FrameMarksLayer(client.scene)
+        self._marks = FrameMarksLayer(client.scene, self._drag)
         self._drawn: object = None
         photos, gui = len(data.scan().frames_with_images), client.gui
         self._phone: Any = gui.add_slider(
@@ -108,6 +112,25 @@ class LookingControls:
         self._looking.follows = is_on
         self._looking.follow(self._state())
         self.render(self._state())
+
+    def _drag(self, key: str, event: Any) -> None:
+        """A click in the picture is dragged: its mark follows, and where it is let go counts, as one step."""
+        state, target = self._state(), self._looking.target
+        view = None if target is None else view_of(self._data, state, target.side, target.frame)
+        if view is None or target is None:
+            return
+        eye = np.asarray(event.client.camera.position)
+        ray = np.asarray(event.end_position) - eye
+        pixel = pixel_in_frame(view.camera, view.scan_from_camera, eye, ray, PLANE_M) if ray.any() else None
+        if event.phase == "end":
+            self._drawn = None  # where nothing comes of it, the mark goes back
+            at = None if pixel is None else (float(pixel[0]), float(pixel[1]))
+            actions = [] if at is None else moved_in_frame(self._data, state, target.side, key, target.frame, at)
+            for action in actions or [Notify(Level.INFO, "That is beside the frame; the click stays where it was.")]:
+                self._dispatch(action)
+        elif pixel is not None:
+            event.target.opacity = 0.35  # it is not seen else
+            event.target.position = on_plane(view, np.array([pixel]))[0]
 
     def _show_phone(self, frame: int) -> None:
         if 0 <= frame < len(self._data.scan().frames_with_images):

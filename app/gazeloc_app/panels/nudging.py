@@ -1,4 +1,8 @@
-"""The arrow keys of one browser: they nudge the selected keypoint (see hand.py for what of it)."""
+"""The arrow keys of one browser as commands: they nudge the selected keypoint (see hand.py for what of it).
+
+The page takes the keys itself while a keypoint is selected (static/page/arrows.js), else viser would turn the view with
+them; the commands are in the palette and name the keys in the help.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +12,20 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.moving import ARROWS, FINE_STEP_PX, LONG_STEP_M, STEP_M, STEP_PX, Nudge
+from gazeloc_app.moving import ARROWS, Nudge, nudge_of
 
 NAMES = {"arrowleft": "left", "arrowright": "right", "arrowup": "up", "arrowdown": "down"}
+LENGTHS = {False: "2 mm, in frames by a pixel", True: "1 cm, in frames by a tenth of a pixel"}
 
 
 def add_nudges(gui: GuiApi, nudge: Callable[[Nudge], None]) -> None:
-    """Call `nudge(step)` for every arrow: 2 mm or a pixel, with the shift key 1 cm or a tenth; not while typing."""
-    steps: tuple[tuple[Any, float, float, str], ...] = (
-        (None, STEP_M, STEP_PX, "2 mm, in frames by a pixel"),
-        ("shift", LONG_STEP_M, FINE_STEP_PX, "1 cm, in frames by a tenth of a pixel"),
-    )
-    for modifier, step_m, step_px, length in steps:
-        for key, screen in ARROWS.items():
+    """Call `nudge(step)` for every arrow, with the shift key and without; not while typing into a field."""
+    for is_shifted, length in LENGTHS.items():
+        modifier: Any = "shift" if is_shifted else None
+        for key in ARROWS:
             hotkey: Any = key
             command = gui.add_command(f"Nudge {NAMES[key]} by {length}", hotkey=hotkey, modifier=modifier)
-            widgets.on_user(command, _nudging(nudge, Nudge(screen, step_m, step_px)), event="on_trigger")
+            widgets.on_user(command, _nudging(nudge, nudge_of(key, is_shifted=is_shifted)), event="on_trigger")
 
 
 def _nudging(nudge: Callable[[Nudge], None], step: Nudge) -> Callable[[Any], None]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import viser
@@ -18,14 +19,19 @@ _BEFORE_PICTURE = 0.995
 """Share of the picture's distance at which marks stand, so that it does not cover them."""
 _ARM = 0.014
 """Half a cross, as a share of the picture's width."""
+_GRIP = 0.016
+"""Radius of the ball at which a clicked mark is gripped, likewise."""
 
 
 class FrameMarksLayer:
-    """On one client's scene at `/picture-marks`; a clicked one is an upright cross, an expected one a slanted."""
+    """On one client's scene at `/picture-marks`; a clicked one is an upright cross, an expected one a slanted.
 
-    def __init__(self, scene: viser.SceneApi):
-        self._scene = scene
-        self._handles: list[viser.LineSegmentsHandle | viser.LabelHandle] = []
+    Clicked ones can be gripped at a ball that is not seen: `on_drag(key, event)` hears of it.
+    """
+
+    def __init__(self, scene: viser.SceneApi, on_drag: Callable[[str, Any], None]):
+        self._scene, self._on_drag = scene, on_drag
+        self._handles: list[viser.SceneNodeHandle] = []
 
     def show(self, view: View | None, marks: Sequence[Mark], lines: Sequence[Line], selected: str | None) -> None:
         """Draw the marks and lines in the view; None takes them away."""
@@ -37,15 +43,17 @@ class FrameMarksLayer:
         segments, colors = [np.zeros((0, 2, 3))], [np.zeros((0, 3))]
         for mark in marks:
             ends = _cross(mark, view.camera.width)
-            segments.append(_on_plane(view, ends.reshape(-1, 2)).reshape(-1, 2, 3))
+            segments.append(on_plane(view, ends.reshape(-1, 2)).reshape(-1, 2, 3))
             color = SELECTED if mark.key == selected else CLICKED if mark.is_clicked else EXPECTED
             colors.append(np.tile(color, (len(ends), 1)))
-            at = _on_plane(view, np.array([[mark.x_px, mark.y_px]]))[0]
+            at = on_plane(view, np.array([[mark.x_px, mark.y_px]]))[0]
             self._handles.append(
                 self._scene.add_label(f"/picture-marks/{mark.key}", mark.name, position=at, anchor="bottom-left")
             )
+            if mark.is_clicked:
+                self._add_grip(view, mark.key, at)
         for line in lines:
-            points = _on_plane(view, line.pixels)
+            points = on_plane(view, line.pixels)
             segments.append(np.stack([points[:-1], points[1:]], axis=1))
             color = SELECTED if line.key == selected else EXPECTED
             colors.append(np.tile(color, (len(points) - 1, 1)))
@@ -58,6 +66,25 @@ class FrameMarksLayer:
                 )
             )
 
+    def _add_grip(self, view: View, key: str, at: Floats) -> None:
+        reach_px = _GRIP * view.camera.width
+        grip = self._scene.add_icosphere(
+            f"/picture-grips/{key}",
+            radius=float(reach_px * PLANE_M / np.mean(view.camera.focal_px)),
+            subdivisions=1,
+            opacity=0.0,
+            position=at,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+        async def dragged(event: Any) -> None:
+            self._on_drag(key, event)
+
+        handler: Any = dragged  # viser takes coroutines too, which its annotation does not say
+        grip.on_drag("left")(handler)
+        self._handles.append(grip)
+
 
 def _cross(mark: Mark, width_px: int) -> Floats:
     """(2, 2, 2) the two strokes of a cross in pixels."""
@@ -68,7 +95,7 @@ def _cross(mark: Mark, width_px: int) -> Floats:
     return np.array([mark.x_px, mark.y_px]) + arm * strokes
 
 
-def _on_plane(view: View, pixels: Floats) -> Floats:
+def on_plane(view: View, pixels: Floats) -> Floats:
     """Places (N, 3) in the frame `scan` of pixels (N, 2), just before the picture that is looked through."""
     rays = view.camera.unproject(pixels)
     rays = rays / rays[:, 2:] * PLANE_M * _BEFORE_PICTURE
