@@ -30,6 +30,7 @@ from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import KeypointPair
+from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.viewpoint import up_vector
 
 _LEAST_ACROSS_PX, _MOST_ACROSS_PX = 40.0, 20_000.0
@@ -98,7 +99,7 @@ class Hand:
         elif "key" in query:
             self._do(self._place_click(state, query["key"], frame, pixel))
         elif frame_pose(reach.data, state, frame) is None:
-            self._say(f"Frame {frame} is not in the reconstruction, so a click in it says no place; go to a keyframe.")
+            self._say(_not_in_reconstruction(reach.data.model(state.recording), frame))
         else:
             across = _number(query, "across", _LEAST_ACROSS_PX, _MOST_ACROSS_PX)
             reach_px = NEAR_PX * camera.width / across if reach.snaps() else 0.0
@@ -174,6 +175,16 @@ class Hand:
 
     def _say(self, sentence: str) -> None:
         self._reach.dispatch(Notify(Level.INFO, sentence))
+
+
+def _not_in_reconstruction(model: SfmModel | None, frame: int) -> str:
+    frames = np.zeros(0, np.int64) if model is None else model.frame_indices[model.frame_indices >= 0]
+    if len(frames) == 0:
+        return "There is no reconstruction yet, so a click in a frame says no place; run the stages first."
+    nearest = int(frames[np.abs(frames - frame).argmin()])
+    return (
+        f"Frame {frame} is no keyframe of the reconstruction, so a click in it says no place; frame {nearest} is one."
+    )
 
 
 def _whole(query: Mapping[str, str], name: str) -> int:

@@ -118,6 +118,20 @@ def place(tmp_path):
     return Place(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("what", "method"),
+    [("arrow", "press_arrow"), ("frame-click", "click_in_frame"), ("loupe-click", "click_in_loupe")],
+)
+def test_what_a_page_asks_of_keypoints_goes_to_its_own_hand_alone(place, what, method):
+    client, one = place.come(TAB)
+    _, other = place.come(OTHER)
+    assert place.ask(client.secret, f"{what}?key=k1") == (200, "here")
+    getattr(one.hand, method).assert_called_once_with({"key": "k1"})
+    getattr(other.hand, method).assert_not_called()
+    assert place.ask("made-up", f"{what}?key=k1") == (200, "gone")
+    getattr(one.hand, method).assert_called_once()
+
+
 def test_a_reload_comes_back_to_camera_tool_and_frame(place):
     client, one = place.come(TAB)
     client.camera.position, client.camera.fov = np.array([4.0, 5, 6]), 0.7
