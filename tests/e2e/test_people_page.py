@@ -177,5 +177,6 @@ def test_a_job_goes_on_without_a_page_and_one_that_waits_can_be_taken_off(open_a
     again = open_app()
     again.page.get_by_text("Aligned: keypoints").locator("visible=true").first.wait_for()
     again.page.get_by_text("What the jobs said").click()
-    again.page.get_by_text("Align", exact=True).first.wait_for()
+    again.page.locator("details summary").get_by_text("Align", exact=True).first.wait_for()
+    again.page.wait_for_timeout(500)  # the folder unfolds
     again.viewer.save("people-job-done")
