@@ -17,22 +17,27 @@ import signal
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.picks import PickPoint, Side
+from gazeloc_app.actions.places import RemoveView, SaveView
+from gazeloc_app.actions.views import TintLayer
 from gazeloc_app.annotation.history import History
+from gazeloc_app.annotation.room_saving import RoomSaver
 from gazeloc_app.annotation.saving import Saver, annotation_in_files
 from gazeloc_app.app import App
-from gazeloc_app.state import Annotation, AppState
+from gazeloc_app.state import Annotation, AppState, Layer
 from viser import _messages
 
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
+from gazeloc_core.saved_views import SavedView
 
 BROWSERS = (7, 8)
 LIFE_S = 60.0
@@ -82,9 +87,11 @@ def check_end(folder: Path, outcome: Outcome, allowed: set[str] | None = None) -
         if allowed is not None and Digests()(history) not in allowed:
             outcome.lost.append("the history at the end is not the last one shown")
         state = history.put_into(AppState(("walk",), "walk"))
+        room = saver.room_after_a_kill(RoomSaver(folder).read())
         saver.commit(state, state)
         saver.settle(state, state)
-        if annotation_in_files(project, "walk") != history.present:
+        in_files = replace(annotation_in_files(project, "walk"), views=room.views, tints=room.tints)
+        if in_files != history.present:
             outcome.lost.append("the project's files differ from the history")
     outcome.steps = len(history.annotations)
 
@@ -168,9 +175,18 @@ def _browse(app: App, seed: int, client_id: int) -> None:
             app.store.dispatch(ChooseAlignment(rng.choice([None, "a", "b"])))
         elif kind < 0.55:
             app.store.dispatch(ChooseMethod(rng.choice(list(Method))))
+        elif kind < 0.65:
+            app.store.dispatch(_about_the_room(rng))
         else:
             _use_widget(app, rng, client_id)
         time.sleep(rng.uniform(0.0, 0.03))
+
+
+def _about_the_room(rng: random.Random) -> Action:
+    name = f"view {rng.randrange(4)}"
+    view = SavedView(name, (rng.uniform(0, 4), 1.0, 1.5), (2.0, 1.0, 1.0))
+    color = (rng.randrange(256), 80, 200)
+    return rng.choice([SaveView(view), RemoveView(name), TintLayer(Layer.SCAN, rng.choice([None, color]))])
 
 
 def _use_widget(app: App, rng: random.Random, client_id: int) -> None:

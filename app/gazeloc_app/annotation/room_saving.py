@@ -1,7 +1,8 @@
 """What people decided about the room, saved views and layers' colours: one file each, for all recordings.
 
-They are written before the recording's journal, which has them too so that they can be undone, and before they show:
-after a crash these files know the newest, and a recording's history is brought up to them (`History.with_room_of`).
+The recording's journal has them too, so that they can be undone, and is written first. Another recording's history is
+brought up to these files when it is opened (`History.with_room_of`). A kill between the two leaves the journal without
+its mark: then it knows the newest (`Saver.room_after_a_kill`), and the files follow with the next action.
 """
 
 from __future__ import annotations

@@ -9,10 +9,12 @@ wins. A start that finds it, but other files, follows the files: somebody change
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 
 from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
 from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
@@ -22,6 +24,7 @@ from gazeloc_core.project import Chosen, Project
 
 MAX_LINES = 4 * MAX_UNDO
 """A journal that is longer is written anew, with the steps alone that can still be reached."""
+_TAIL_BYTES = 256
 _log = logging.getLogger(__name__)
 
 
@@ -58,6 +61,16 @@ class Saver:
             if history.present != files:
                 self._wanted[recording] = history.then(files)
         return self._wanted[recording]
+
+    def room_after_a_kill(self, room: Annotation) -> Annotation:
+        """What was decided about the room: as its files have it (`room`), or as a journal that a kill left unsettled.
+
+        That one is the newer: the room's files are written after the journal (room_saving.py).
+        """
+        for recording in self._project.settings.recordings:
+            if not _ends_settled(self._project.history_path(recording)):
+                room = self.open(recording).present
+        return room
 
     @property
     def has_unsaved(self) -> bool:
@@ -142,6 +155,21 @@ def annotation_in_files(project: Project, recording: str) -> Annotation:
         method=project.method(recording),
         marks=project.marks(recording),
     )
+
+
+def _ends_settled(journal: Path) -> bool:
+    """Whether the last whole line is the mark; a look at the end alone, for a long line is none. True without lines."""
+    try:
+        with journal.open("rb") as file:
+            file.seek(max(0, journal.stat().st_size - _TAIL_BYTES))
+            tail = file.read()
+    except OSError:
+        return True
+    lines = tail.split(b"\n")[:-1]
+    try:
+        return not lines or "settled" in json.loads(lines[-1])
+    except (ValueError, TypeError):
+        return False
 
 
 def _write_files(project: Project, recording: str, annotation: Annotation) -> None:
