@@ -12,8 +12,8 @@ from gazeloc_app import widgets
 
 _HTML = """<div class="gazeloc-scrub" title="Which frame of the recording shows, everywhere. Arrow keys step.">
   <label for="gazeloc-frame">Frame</label>
-  <input id="gazeloc-frame" type="range" min="0" max="{last}" value="0" oninput="gazelocScrub.go(Number(this.value))"
-    onpointerup="this.blur()">
+  <input id="gazeloc-frame" title="Drag to a frame." type="range" min="0" max="{last}" value="0"
+    oninput="gazelocScrub.go(Number(this.value))" onpointerup="this.blur()">
   <input type="number" min="0" max="{last}" value="0" aria-label="Frame's number" oninput="this.dataset.typing = 1"
     onchange="gazelocScrub.typed(this)">
   <img alt="" src="data:," style="display:none" onerror="gazelocScrub.ready()">
