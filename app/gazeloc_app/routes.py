@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from gazeloc_app.drawing.render_process import Superseded
+from gazeloc_app.drawing.render_process import Closing, Superseded
 from gazeloc_core.errors import GazelocError, InputError
 from gazeloc_core.resources import static_file
 
@@ -72,9 +72,9 @@ class Routes:
 async def _guarded(handler: Handler, asked: Asked) -> Reply:
     try:
         return await handler(asked)
-    except Superseded as error:
+    except (Superseded, Closing) as error:
         _log.debug("%s", error)
-        return Reply(body=b"", content_type="image/jpeg", status=204)  # the page has moved on already
+        return Reply(body=b"", content_type="image/jpeg", status=204)  # the page has moved on, or we end
     except GazelocError as error:
         return _text(404 if isinstance(error, InputError) else 503, str(error))
     except Exception:

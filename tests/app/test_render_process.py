@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from gazeloc_app.drawing.render_process import RenderProcess, Superseded
+from gazeloc_app.drawing.render_process import Closing, RenderProcess, Superseded
 from gazeloc_app.drawing.render_worker import Cast, Describe, Frame, Render, Sources, camera_text
 
 from gazeloc_core.camera import Camera
@@ -225,6 +225,6 @@ def test_after_closing_nothing_hangs(made):
     running, waiting = process.submit(Describe()), process.submit(Describe(), "key")
     process.close()
     for future in (running, waiting, process.submit(Describe())):
-        with pytest.raises(RenderError):
+        with pytest.raises(Closing):
             future.result(10)
     assert process.pid is None

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from gazeloc_app.drawing.render_process import Superseded
+from gazeloc_app.drawing.render_process import Closing, Superseded
 from gazeloc_app.routes import Reply, Routes, add_picture_routes, add_static_route
 
 from gazeloc_core.errors import InputError, RenderError
@@ -26,6 +26,8 @@ def pictures():
             raise InputError("There is no frame 404.")
         if index == 503:
             raise RenderError("The process died.")
+        if index == 410:
+            raise Closing
         if index == 409:
             raise Superseded("A newer picture was asked for.")
         if index == 500:
@@ -57,8 +59,9 @@ def test_a_frame_is_a_number(pictures, index):
     assert ask(pictures, f"/frames/a/{index}.jpg").status == 404
 
 
-def test_a_picture_that_the_page_no_longer_shows_is_no_error(pictures):
-    reply = ask(pictures, "/renders/a/409.jpg?rev=5")
+@pytest.mark.parametrize("index", [409, 410])
+def test_a_picture_that_the_page_no_longer_shows_and_one_when_the_app_ends_are_no_errors(pictures, index):
+    reply = ask(pictures, f"/renders/a/{index}.jpg?rev=5")
     assert (reply.status, reply.body, reply.cache_s) == (204, b"", 0)
 
 

@@ -39,6 +39,13 @@ class Superseded(GazelocError):
     """A newer request with the same key came before this one was begun; nothing is wrong."""
 
 
+class Closing(RenderError):
+    """GazeLoc ends, so nothing is drawn any more; nothing is wrong."""
+
+    def __init__(self) -> None:
+        super().__init__("GazeLoc is closing; nothing is drawn any more.")
+
+
 @dataclass(frozen=True)
 class _Waiting:
     rank: tuple[int, int]
@@ -85,7 +92,7 @@ class RenderProcess:
             dropped = [w for w in self._waiting if key is not None and w.key == key]
             self._waiting = [w for w in self._waiting if w not in dropped]
             if self._closed:
-                future.set_exception(RenderError("GazeLoc is closing; nothing is drawn any more."))
+                future.set_exception(Closing())
             elif cached is not None:
                 future.set_result(cached)
             else:
@@ -118,7 +125,7 @@ class RenderProcess:
             waiting, self._waiting = self._waiting, []
             self._changed.notify()
         for one in waiting:
-            one.future.set_exception(RenderError("GazeLoc is closing; nothing is drawn any more."))
+            one.future.set_exception(Closing())
         process = self._process
         if process is not None and process.is_alive():
             process.kill()
@@ -195,8 +202,9 @@ class RenderProcess:
             f"The process that draws died while it worked on a {type(job).__name__.lower()} "
             f"(exit code {self._process.exitcode}); it is started again with the next picture."
         )
-        if not self._closed:
-            self._on_trouble(sentence)
+        if self._closed:
+            return Closing()
+        self._on_trouble(sentence)
         return RenderError(sentence)
 
 
