@@ -76,6 +76,7 @@ class Look:
     def __init__(self, client: viser.ClientHandle, panels: Sequence[Any]):
         self._client, self._panels = client, panels
         self._until = time.monotonic() + _SETTLED_S
+        self._is_narrow = self._is_folded = False
         client.camera.on_update(self._fit)
         self._is_dark = False
         toggle: Any = client.gui.add_command("Light or dark", description="The look of the app in this browser")
@@ -100,13 +101,19 @@ class Look:
         self._client.local_storage.set_item(_KEY, "dark" if self._is_dark else "light")
 
     async def _fit(self, camera: viser.CameraHandle) -> None:
-        """Once, while the page still settles: later on its widths are the person's."""
-        if time.monotonic() < self._until and camera.image_width < NARROW_PX:
-            self._until = 0.0
-            is_upright = camera.image_width < UPRIGHT_PX
+        """Once, while the page still settles: later on its widths are the person's.
+
+        Panels glide to their places, so that the room gets narrower by and by: each is looked for by itself.
+        """
+        if time.monotonic() > self._until:
+            return
+        if not self._is_narrow and camera.image_width < NARROW_PX:
+            self._is_narrow = True
             for panel in self._panels:
                 set_panel_width(self._client, panel, TABLET_PANEL_PX)
-            for panel in self._panels[1:] if is_upright else ():
+        if not self._is_folded and camera.image_width < UPRIGHT_PX:
+            self._is_folded = True
+            for panel in self._panels[1:]:
                 fold_panel(self._client, panel)
 
     async def _toggled(self, _event: object) -> None:

@@ -75,10 +75,13 @@ def test_so_does_what_is_in_our_own_html(app, monkeypatch):
             app.store.step()
         return [handle.content for handle in gc.get_objects() if isinstance(handle, GuiHtmlHandle)]
 
-    found = re.findall(r"<(?:button|input|select)\b[^>]*>", "".join(while_connected(app, look)))
+    shown = "".join(while_connected(app, look))
+    found = re.findall(r"<(?:button|input|select)\b[^>]*>", shown)
     kinds = ("gazeloc-step", "gazeloc-small", "Your name")
     assert [kind for kind in kinds if not any(kind in tag for tag in found)] == []
-    assert [tag for tag in found if not re.search(r'(title|aria-label)="[^"]+"', tag)] == []
+    labelled = {f'id="{name}"' for name in re.findall(r'<label for="([^"]+)"', shown)}
+    silent = [tag for tag in found if not re.search(r'(title|aria-label)="[^"]+"', tag)]
+    assert [tag for tag in silent if not any(name in tag for name in labelled)] == []
     step(app, *(CancelJob(number) for number in (1, 2)), JobEnded(Level.INFO, "done"), Undo())
 
 
@@ -189,8 +192,11 @@ def test_the_dark_is_remembered_by_the_browser():
     client.local_storage.set_item.assert_called_with("gazeloc-look", "light")
 
 
-@pytest.mark.parametrize(("width_px", "panels", "folds"), [(120, 2, 1), (190, 2, 0), (450, 0, 0)])
-def test_a_tablets_panels_are_narrower_once_and_upright_one_is_folded_up(app, monkeypatch, width_px, panels, folds):
+@pytest.mark.parametrize(
+    ("widths_px", "panels", "folds"),
+    [((120, 120, 120), 2, 1), ((300, 125, 128), 2, 1), ((190, 190, 384), 2, 0), ((700, 450, 450), 0, 0)],
+)
+def test_a_tablets_panels_are_narrower_once_and_upright_one_is_folded_up(app, monkeypatch, widths_px, panels, folds):
     set_to, folded = [], []
     monkeypatch.setattr(looks, "fold_panel", lambda client, panel: folded.append(panel))
     monkeypatch.setattr(looks, "set_panel_width", lambda client, panel, width: set_to.append((panel, width)))
@@ -200,7 +206,7 @@ def test_a_tablets_panels_are_narrower_once_and_upright_one_is_folded_up(app, mo
             known = set(app._looks)
             await visitor.send(CAMERA)
             await until(lambda: set(app._looks) - known)
-            for fov in (0.81, 0.82, 0.83):
+            for fov, width_px in zip((0.81, 0.82, 0.83), widths_px, strict=True):
                 await visitor.send(CAMERA | {"image_width": width_px, "fov": fov})
             await until(lambda: any(c.camera.fov == 0.83 for c in app.server.get_clients().values()))
             await asyncio.sleep(0.1)
