@@ -55,6 +55,8 @@ AXES: tuple[Rgb, Rgb, Rgb] = ((213, 94, 0), (0, 158, 115), (0, 114, 178))
 """Of the grid, and of x, y and z."""
 SERIES: tuple[Rgb, ...] = ((28, 110, 140), (210, 90, 30), (150, 30, 240), (90, 30, 0), (0, 240, 150), (240, 210, 0))
 """Of charts."""
+PEOPLE = SERIES
+"""By their numbers."""
 CHART_TEXT: Rgb = (123, 135, 148)
 """Legible in light and dark."""
 

@@ -18,8 +18,9 @@ from gazeloc_app.actions.people import MAX_NAME, PersonCame, PersonLeft
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowLayer
 from gazeloc_app.frames.looking import Target
+from gazeloc_app.palette import PEOPLE
 from gazeloc_app.panels.history import MAX_SHOWN, HistoryPanel
-from gazeloc_app.panels.people import COLORS, PeopleBar
+from gazeloc_app.panels.people import PeopleBar
 from gazeloc_app.routes import Routes
 from gazeloc_app.state import AppState, Layer
 from gazeloc_app.view_memory import MAX_BROWSERS, View, ViewMemory
@@ -241,7 +242,7 @@ class TestOthersInTheScene:
         frustum, label = (first.scene.nodes[name] for name in ("/people/2", "/people-names/2"))
         assert tuple(frustum.position) == tuple(label.position) == (3, 2, 1)
         assert (label.text, frustum.fov) == ("<b>Bo", 1.0)
-        assert frustum.color == COLORS[1]
+        assert frustum.color == PEOPLE[1]
         assert set(second.scene.nodes) == {"/people/1", "/people-names/1"}
         assert "measures a distance" in place.bar(first)._others.content
 

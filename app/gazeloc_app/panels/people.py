@@ -8,24 +8,15 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.people import MAX_NAME
-from gazeloc_app.palette import Rgb
+from gazeloc_app.palette import PEOPLE, Rgb
 from gazeloc_app.state import Person
 
-COLORS: tuple[Rgb, ...] = (
-    (0, 114, 178),
-    (213, 94, 0),
-    (0, 158, 115),
-    (204, 121, 167),
-    (184, 134, 11),
-    (86, 180, 233),
-)
-"""By a person's number; after Okabe and Ito, told apart by colour-blind eyes."""
 MAX_SHOWN = 12
 
 
 def color_of(person: Person) -> Rgb:
     """A person's colour, in panels and in the scene."""
-    return COLORS[(person.number - 1) % len(COLORS)]
+    return PEOPLE[(person.number - 1) % len(PEOPLE)]
 
 
 class PeopleBar:
