@@ -24,7 +24,7 @@ from gazeloc_core.trajectory import Trajectory
 
 
 def trajectory_of(status):
-    has_pose = np.array([name in ("registered", "interpolated", "tag_only") for name in status])
+    has_pose = np.array([name in ("registered", "tracked", "interpolated", "tag_only") for name in status])
     return Trajectory(
         timestamp_ns=np.arange(len(status)),
         status=np.array(status),
@@ -73,6 +73,21 @@ def test_a_long_recording_is_drawn_in_parts_and_its_worst_frames_stay_seen():
     assert len(content) < 30 * PARTS
     assert f"{STATUS_COLORS['rejected']} 50.00%" in content
     assert "left:25.00%" in content
+
+
+@pytest.mark.parametrize(
+    ("part", "shown"),
+    [
+        (["registered", "tracked"], "registered"),  # keyframes stay seen while there is room for them
+        (["tracked", "registered", "tracked"], "tracked"),
+        (["registered", "registered", "tracked"], "registered"),
+        (["tracked", "interpolated", "registered"], "interpolated"),
+    ],
+)
+def test_a_part_of_the_strip_shows_its_worst_or_what_most_of_it_is(part, shown):
+    status = np.array(part * PARTS)
+    content = timeline_html(trajectory_of(status), np.full(len(status), np.nan), None, FrameMarks())
+    assert f"linear-gradient(90deg,{STATUS_COLORS[shown]} 0.00% 100.00%)" in content
 
 
 def test_a_recording_without_anything_has_a_timeline_too():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal
 from gazeloc_core.agreement import LOW_SCORE
-from gazeloc_core.arrays import Floats
+from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.marks import FrameMarks, Mark
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
@@ -59,15 +59,23 @@ def timeline_html(trajectory: Trajectory | None, score: Floats, error_m: Floats 
 
 
 def _strip(status: NDArray[np.str_]) -> str:
-    """A bar in runs of one colour; a part of several frames has the colour of its worst."""
+    """A bar in runs of one colour; a part of several frames has that of its worst, or of most if all are measured."""
     rank = np.array([_WORST_FIRST.index(str(name)) for name in status])
-    worst = np.array([part.min() for part in np.array_split(rank, min(len(rank), PARTS))])
+    worst = np.array([_of_part(part) for part in np.array_split(rank, min(len(rank), PARTS))])
     edges = np.concatenate([[0], np.flatnonzero(np.diff(worst)) + 1, [len(worst)]])
     stops = ",".join(
         f"{STATUS_COLORS[_WORST_FIRST[worst[a]]]} {100 * a / len(worst):.2f}% {100 * b / len(worst):.2f}%"
         for a, b in pairwise(edges.tolist())
     )
     return f'<div style="height:10px;background:linear-gradient(90deg,{stops})"></div>'
+
+
+def _of_part(rank: Ints) -> int:
+    """The place in `_WORST_FIRST` that stands for some frames (K,): tracked ones are no worse than registered ones."""
+    tracked, registered = len(_WORST_FIRST) - 2, len(_WORST_FIRST) - 1
+    if rank.min() < tracked:
+        return int(rank.min())
+    return registered if 2 * (rank == registered).sum() >= len(rank) else tracked
 
 
 def _mark_ticks(marks: FrameMarks, count: int) -> str:
