@@ -5,6 +5,7 @@ Made in seconds and without structure from motion: the reconstruction is the tru
 
 from __future__ import annotations
 
+import atexit
 import json
 import shutil
 import tempfile
@@ -108,6 +109,7 @@ def make_app_project(folder: Path, *, recordings: tuple[str, ...] = ("walk",), t
 @lru_cache(maxsize=4)
 def _template(recordings: tuple[str, ...], tags: bool) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="gazeloc-app-project-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     mesh = room_mesh()
     trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False).export(folder / "room.ply")
     entries = {name: _write_recording(folder / name, mesh) for name in recordings}
