@@ -6,9 +6,9 @@ reconstruction puts them in the image, not where a feature was found: so a frame
 image's pose, however far off single features are. Nothing is smoothed, and the motion between the images is not assumed
 to be simple: what is expected of it only refuses (`track_evidence`).
 
-Points are not carried back to prove that they were carried well. That doubles the time of carrying, and the points prove
-it already: those that went astray do not move as one with the others. On the sample scene and on hurried ones, mean
-errors with and without that check differ by less than 0.01°.
+Points are not carried back to prove that they were carried well. That doubles the time of carrying, and the points
+prove it already: those that went astray do not move as one with the others. On the sample scene and on hurried ones,
+mean errors with and without that check differ by less than 0.01°.
 """
 
 from __future__ import annotations
