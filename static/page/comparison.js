@@ -1,9 +1,9 @@
 // The frame against the render of the scan from its pose, in ways that belong to this browser and outlast a reload.
 //
-// The panel sends a new <div class="gazeloc-comparison"> for each frame, which holds URLs and no pictures. The stage with
-// the pictures is one and the same node that moves into it. Which frame shows is scrub.js's. One frame's pictures are
-// loaded at a time, small ones first, and then those of the frame that was asked for last: playing drops frames, and what
-// is shown is always a frame with its own render and its own number.
+// The panel has one place for the pictures, and says of each frame in a hidden <div class="gazeloc-told"> where its
+// pictures are. Which frame shows is scrub.js's. One frame's pictures are loaded at a time, small ones first, and then
+// those of the frame that was asked for last: playing drops frames, and what is shown is always a frame with its own
+// render and its own number.
 window.gazelocComparison = (() => {
   const MODES = [
     ["wipe", "Wipe", "Drag over the picture: the frame on the left, the render on the right."],
@@ -103,11 +103,16 @@ window.gazelocComparison = (() => {
     if (choice.mode === "edges") drawEdges();
   }
 
-  // Move into the box that the panel has sent, and pass on what it says.
+  // The panel has made the place where the pictures are, or made it anew.
+  function home(box) {
+    if (!root) build();
+    box.append(root);
+  }
+
+  // Pass on what the panel says of a frame.
   function take(box) {
     if (!box.isConnected) return; // a newer one has come already
     if (!root) build();
-    box.append(root);
     window.gazelocScrub.take(saidBy(box));
   }
 
@@ -179,7 +184,8 @@ window.gazelocComparison = (() => {
   // The picture; undefined where there is none, and then `failed` says why.
   async function fetched(url, how) {
     const { image, why } = await pictures().load(url, how);
-    failed.set(url, why);
+    if (why) failed.set(url, why);
+    else failed.delete(url);
     return image;
   }
 
@@ -231,7 +237,7 @@ window.gazelocComparison = (() => {
     overlay.hidden = choice.lens; // keypoints are known in undistorted frames
     const [first, second] = what.names;
     names[0].textContent = `A ${first}${render ? "" : ": no pose"}`;
-    names[1].textContent = `B ${second || "not chosen"}${other || !second ? "" : ": no pose"}`;
+    names[1].textContent = `B ${second || "is chosen below"}${other || !second ? "" : ": no pose"}`;
     stage.toggleAttribute("data-none", !render);
     stage.toggleAttribute("data-none-other", !other);
     number.textContent = `frame ${what.number}`;
@@ -259,5 +265,5 @@ window.gazelocComparison = (() => {
     }
   }
 
-  return { take, show, choose };
+  return { home, take, show, choose };
 })();

@@ -48,7 +48,7 @@ def bench_scrub(browser: Browser, app: App, count: int = 12) -> list[Row]:
     _time(viewer, frames[0], 0)  # the first one opens the video and the renderer
     page.wait_for_timeout(4000)
     fresh = [_time(viewer, frame, 3000) for frame in frames[1:]]  # until it has looked ahead
-    again = [_time(viewer, frame, 200) for frame in frames[1:]]
+    again = [_time(viewer, frame, 100) for frame in frames[1:]]
     rows = [
         _row("cached", 60, [times["whole"] for times in again], app),
         _row("not cached, small pictures first", 400, [min(times.values()) for times in fresh], app),

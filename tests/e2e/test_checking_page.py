@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from app_project import make_app_project
 from e2e.app_page import AppPage
-from gazeloc_app.actions.views import ShowFrame
+from gazeloc_app.actions.views import CompareWith, ShowFrame
 from gazeloc_app.app import App
 
 from gazeloc_core.marks import Mark
@@ -106,3 +106,99 @@ def test_keys_mark_step_and_play_and_a_click_in_the_timeline_goes_there(page):
     page.page.keyboard.press("Space")
     page.until(lambda: not page.state.is_playing)
     shown(page, page.state.frame)
+
+
+def slide(page, frame):
+    page.field("Frame").fill(str(frame))
+
+
+def number_of_picture(page, place):
+    return int(
+        page.page.locator(f".gazeloc-stage img.gazeloc-{place}").get_attribute("src").rpartition("/")[2].split(".")[0]
+    )
+
+
+def test_a_frame_that_was_seen_shows_before_the_app_answers_and_goes_again_where_it_never_does(page):
+    show(page, 4)
+    show(page, 6)
+    held = []
+    page.page.route("**/show/**", held.append)
+    slide(page, 4)
+    assert page.page.locator(".gazeloc-stage").get_attribute("data-shown") == "4"
+    assert (number_of_picture(page, "frame"), number_of_picture(page, "render")) == (4, 4)
+    assert page.page.locator(".gazeloc-number").inner_text() == "frame 4"
+    assert page.state.frame == 6
+    shown(page, 6)  # the app still shows another one: so does the page, after a while
+    assert page.field("Frame").input_value() == "6"
+    held[0].abort()
+
+
+def test_what_is_shown_is_one_frame_with_its_own_render_and_number_however_quick_the_moves(page):
+    show(page, 2)
+    page.page.evaluate("""() => {
+      window.__mixed = [];
+      const stage = document.querySelector('.gazeloc-stage');
+      new MutationObserver(() => {
+        const numbers = [...stage.querySelectorAll('img')].slice(0, 2).map((i) => i.src.match(/([0-9]+)[.]jpg/)[1]);
+        const all = [...numbers, stage.dataset.shown, stage.querySelector('.gazeloc-number').textContent.split(' ')[1]];
+        if (new Set(all).size > 1) window.__mixed.push(all.join());
+      }).observe(stage, {attributes: true, attributeFilter: ['data-shown']});
+    }""")
+    for frame in (0, 8, 4, 14, 2, 12, 10):
+        slide(page, frame)
+    shown(page, 10)
+    page.until(lambda: page.state.frame == 10)
+    assert page.page.evaluate("window.__mixed") == []
+
+
+def test_two_people_who_scrub_at_once_end_at_one_frame(page, open_page):
+    other = AppPage(open_page(page.app.address, width=1000, height=700), page.app)
+    for one in (page, other):
+        shown(one, page.state.frame)
+    for mine, theirs in ((2, 14), (4, 12), (6, 10)):
+        slide(page, mine)
+        slide(other, theirs)
+    page.page.wait_for_timeout(1500)
+    for one in (page, other):
+        shown(one, page.state.frame)
+        assert one.field("Frame").input_value() == str(page.state.frame)
+    other.page.reload()
+    shown(other, page.state.frame)
+
+
+def test_a_frame_that_cannot_be_read_says_so_where_its_picture_would_be(page):
+    path = page.app.data.recording("walk").path / "f_003.png"
+    path.write_bytes(path.read_bytes()[:300])
+    slide(page, 3)
+    page.page.locator(".gazeloc-said", has_text="f_003.png").wait_for(timeout=60_000)
+    page.viewer.save("checking-unreadable")
+    slide(page, 4)
+    shown(page, 4)
+    assert page.page.locator(".gazeloc-said").inner_text() == ""
+
+
+def test_the_number_field_goes_to_a_frame_and_refuses_what_is_none(page):
+    show(page, 4)
+    field = page.page.get_by_label("Frame's number")
+    field.fill("9")
+    field.press("Enter")
+    page.until(lambda: page.state.frame == 9)
+    field.fill("999")
+    field.press("Enter")
+    page.until(lambda: page.state.frame == len(page.app.data.recording("walk")) - 1)
+
+
+def test_two_renders_stand_below_the_frame_also_where_they_are_the_very_same(page):
+    show(page, 4)
+    page.app.store.dispatch(CompareWith(page.state.annotation.alignment))
+    mode(page, "A | B")
+    page.page.wait_for_selector(".gazeloc-stage img.gazeloc-other", timeout=60_000)
+    show(page, 6)
+    boxes = [
+        page.page.locator(f".gazeloc-stage img.gazeloc-{place}").bounding_box()
+        for place in ("frame", "render", "other")
+    ]
+    assert boxes[1]["y"] == boxes[2]["y"] >= boxes[0]["y"] + boxes[0]["height"]
+    assert boxes[2]["x"] >= boxes[1]["x"] + boxes[1]["width"]
+    assert (number_of_picture(page, "render"), number_of_picture(page, "other")) == (6, 6)
+    page.viewer.save("checking-two")

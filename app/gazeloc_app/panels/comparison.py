@@ -22,6 +22,10 @@ from gazeloc_app.frames.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
 from gazeloc_app.state import AppState, Layer
 
+_HOME = """<div class="gazeloc-comparison">
+  <img alt="" src="data:," style="display:none" onerror="gazelocComparison.home(this.parentNode)">
+</div>"""
+"""Where the pictures are: never replaced, so that nothing jumps while frames go by."""
 NO_POSES = "No poses yet: press “Run everything” in the tab Project, or align keypoints in the tab Align."
 NO_POSE = (
     "This frame has no pose, so there is no render of it; “keyframe ▶” and the timeline lead to frames that have one."
@@ -29,12 +33,13 @@ NO_POSE = (
 
 
 class ComparisonHtml:
-    """A piece of HTML that names a frame's pictures."""
+    """The place of the pictures, and a hidden piece of HTML that names those of a frame."""
 
     def __init__(self, gui: GuiApi, template: Path, data: ProjectData):
         self._template = template.read_text(encoding="utf-8")
         self._data = data
         self._revision = secrets.token_hex(4)  # the frames of this session; the browser may keep them
+        gui.add_html(_HOME)
         self._html = gui.add_html("")
         self._marks: object = None
         self._marks_revision = 0
