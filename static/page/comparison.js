@@ -170,13 +170,15 @@ window.gazelocComparison = (() => {
 
   async function load(what) {
     const of = urls(what), isWhole = of.every((url) => !url || pictures().ready(url));
+    of.forEach((url) => failed.delete(url));
     if (!isWhole) {
       const quick = await Promise.all(of.map((url) => url && fetched(url, "quick")));
       if (what.turn === turn && quick.every((image) => image !== undefined)) put(what, quick, "quick");
       if (what.turn !== turn || wanted) return;
     }
     const newer = new Promise((done) => (overtaken = done));
-    const whole = await Promise.race([Promise.all(of.map((url) => url && fetched(url))), newer]);
+    const there = of.map((url) => url && (failed.has(url) ? undefined : fetched(url))); // what failed would fail again
+    const whole = await Promise.race([Promise.all(there), newer]);
     overtaken = undefined;
     if (what.turn === turn && whole) put(what, whole.map((image) => image || ""));
   }
@@ -185,7 +187,6 @@ window.gazelocComparison = (() => {
   async function fetched(url, how) {
     const { image, why } = await pictures().load(url, how);
     if (why) failed.set(url, why);
-    else failed.delete(url);
     return image;
   }
 
