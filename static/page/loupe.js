@@ -2,6 +2,7 @@
 // The server sends its boxes as hidden HTML in a panel (panels/loupe.py), here they get a place over the 3D view.
 window.gazelocLoupe = (function loupe() {
   const KEY = "gazeloc-loupe-folded";
+  const LEAST = 340;
   let dock;
 
   function build() {
@@ -22,6 +23,8 @@ window.gazelocLoupe = (function loupe() {
     if (!canvas || !dock.childElementCount) return;
     const box = canvas.getBoundingClientRect();
     dock.style.left = `${Math.round(box.left) + 14}px`;
+    dock.style.maxWidth = `${Math.round(box.width) - 28}px`;
+    dock.toggleAttribute("data-narrow", box.width < LEAST); // it would hide what it belongs to
   }
 
   function pin(box) {
