@@ -13,7 +13,7 @@ def scores(scan_shift_m):
 
 def test_the_offset_is_told_with_its_uncertainty():
     assert offset_text(scores(0.0), 1) == "It looks 2.3 ± 0.7 cm and 0.8 ± 0.3° off."
-    assert short_offset_text(scores(0.0), 1) == "2.3 cm / 0.8°"
+    assert short_offset_text(scores(0.0), 1) == "2.3 ± 0.7 cm and 0.8 ± 0.3°"
 
 
 def test_what_the_scan_is_off_itself_is_told_apart():

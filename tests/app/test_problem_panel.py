@@ -56,7 +56,10 @@ def test_frames_are_scored_by_a_job_and_shown_for_these_poses_alone(app):
     worst = int(np.nanargmin(found))
     assert panel(app)._list.content.index(f"<b>Frame {worst}</b>") == panel(app)._list.content.index("<b>Frame ")
     found = app.data.frame_scores("walk", app.data.poses_key("walk", app.store.state.annotation))
-    assert f"looks {100 * found.shift_m[worst]:.1f} cm / {found.turn_deg[worst]:.1f}° off" in panel(app)._list.content
+    assert (
+        f"looks {100 * found.shift_m[worst]:.1f} ± {100 * found.shift_sigma_m[worst]:.1f} cm"
+        in panel(app)._list.content
+    )
     step(app, ChooseAlignment(None))
     assert not np.isfinite(scores(app)).any()
 
