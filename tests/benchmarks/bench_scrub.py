@@ -48,9 +48,11 @@ def bench_scrub(browser: Browser, app: App, count: int = 12) -> list[Row]:
     _time(viewer, frames[0], 0)  # the first one opens the video and the renderer
     page.wait_for_timeout(4000)
     fresh = [_time(viewer, frame, 3000) for frame in frames[1:]]  # until it has looked ahead
-    again = [_time(viewer, frame, 100) for frame in frames[1:]]
+    again = [_time(viewer, frame, 100) for frame in frames[1:]]  # the 3D view is drawn anew meanwhile
+    at_rest = [_time(viewer, frame, 2000) for frame in frames[1:]]
     rows = [
-        _row("cached", 60, [times["whole"] for times in again], app),
+        _row("cached, moves on end", 60, [times["whole"] for times in again], app),
+        _row("cached, one move at a time", 60, [times["whole"] for times in at_rest[1:]], app),
         _row("not cached, small pictures first", 400, [min(times.values()) for times in fresh], app),
         _row("not cached, pictures in full", 400, [times["whole"] for times in fresh], app),
         _quick(viewer, app),
