@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from gazeloc_core.arrays import Bools, Floats, Ints, frozen
 from gazeloc_core.errors import InputError
+from gazeloc_core.frames.undistort import unproject_checked
 from gazeloc_core.localize.sfm import within_gaps
 from gazeloc_core.progress import Report, silent
-from gazeloc_core.raycast import NO_FACE, Raycaster
 from gazeloc_core.recording import Gaze, Recording
+from gazeloc_core.surfaces.raycast import NO_FACE, Raycaster
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import interpolate_poses
-from gazeloc_core.undistort import unproject_checked
 
 
 class GazeStatus(StrEnum):

@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
-from gazeloc_core.artifacts import State
 from gazeloc_core.errors import Cancelled, GazelocError, InputError
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
@@ -16,6 +15,7 @@ from gazeloc_core.stages.evaluation import evaluate_project, evaluate_recording,
 from gazeloc_core.stages.exports import FORMATS, export
 from gazeloc_core.stages.poses import methods_with_poses
 from gazeloc_core.stages.scores import FrameScores, load_scores
+from gazeloc_core.storage.artifacts import State
 
 __all__ = [
     "FORMATS",

@@ -10,8 +10,8 @@
       recordings/<recording>/<method>/<stage>/  what one method made of it: poses, gaze
       recordings/<recording>/alignments/<key>.json   immutable, named by their content
 
-Reading needs nothing; whoever writes holds the project's `WriteLock` (lock.py). The scan and the recordings stay where
-they are and are never written to.
+Reading needs nothing; whoever writes holds the project's `WriteLock` (storage/lock.py). The scan and the recordings
+stay where they are and are never written to.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from gazeloc_core.artifacts import Artifact
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.files import read_json, settle_folders, write_json_atomically
-from gazeloc_core.hashing import FileHasher, hash_of_value
+from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.lock import WriteLock, brief_lock
-from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
+from gazeloc_core.storage.artifacts import Artifact
+from gazeloc_core.storage.files import read_json, settle_folders, write_json_atomically
+from gazeloc_core.storage.hashing import FileHasher, hash_of_value
+from gazeloc_core.storage.lock import WriteLock, brief_lock
 
 FORMAT = "gazeloc-project"
 VERSION = 1

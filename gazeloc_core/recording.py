@@ -14,7 +14,7 @@ import numpy as np
 from gazeloc_core.arrays import Bools, Floats, Ints, frozen
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
-from gazeloc_core.frames import FrameSource
+from gazeloc_core.frames.sources import FrameSource
 
 
 @dataclass(frozen=True, eq=False)

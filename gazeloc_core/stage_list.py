@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from gazeloc_core.artifacts import Artifact
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report
 from gazeloc_core.project import Project
@@ -29,6 +28,7 @@ from gazeloc_core.stages import (
     tags,
     tracking,
 )
+from gazeloc_core.storage.artifacts import Artifact
 
 Run = Callable[[Project, str, Report], object]
 Inputs = Callable[[Project, str], Mapping[str, str]]

@@ -21,17 +21,17 @@ from typing import Any
 import numpy as np
 import tyro
 
-from gazeloc_core.files import read_json
 from gazeloc_core.progress import Report, part, silent
+from gazeloc_core.storage.files import read_json
 from gazeloc_core.synthesis import cloud, glasses, paths, phone, truth
 from gazeloc_core.synthesis.fusion import fused
 from gazeloc_core.synthesis.gaze import looked
 from gazeloc_core.synthesis.glasses import GlassesCapture
+from gazeloc_core.synthesis.model import write_model
 from gazeloc_core.synthesis.room import SCAN_FROM_ROOM, Room, build_room, render
 from gazeloc_core.synthesis.routes import ROUTES, RouteName
 from gazeloc_core.synthesis.tags import FAMILY
 from gazeloc_core.synthesis.texturing import textured, write_obj
-from gazeloc_core.synthetic_model import write_model
 
 __all__ = ["PRESETS", "Room", "SceneOptions", "build_room", "render", "scene_room", "write_scene"]
 

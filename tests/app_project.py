@@ -20,11 +20,11 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from gazeloc_core.camera import Camera
 from gazeloc_core.export.tum import write_tum
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.render import RayRenderer
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.stages import anchoring, inputs, recording, scan
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.render import RayRenderer
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 from gazeloc_core.transforms import Similarity

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import cv2
 
-from gazeloc_core.tags import TagDetector, TagOptions
+from gazeloc_core.tags.detection import TagDetector, TagOptions
 
 
 class Found(NamedTuple):

@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from gazeloc_core.alignment.correspondences import Correspondences, gather
 from gazeloc_core.camera import Camera
-from gazeloc_core.correspondences import Correspondences, gather
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel

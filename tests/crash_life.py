@@ -37,7 +37,7 @@ from viser import _messages
 
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
-from gazeloc_core.saved_views import SavedView
+from gazeloc_core.surfaces.saved_views import SavedView
 
 BROWSERS = (7, 8)
 LIFE_S = 60.0

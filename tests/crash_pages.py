@@ -34,7 +34,7 @@ from gazeloc_app.app import App
 from gazeloc_app.state import Annotation, AppState
 from playwright.sync_api import Browser, Error, Page
 
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 from gazeloc_core.project import Project
 
 SIZE = {"width": 1260, "height": 640}

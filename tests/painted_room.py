@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.frames.undistort import undistorted_camera
 from gazeloc_core.recording import Recording
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.undistort import undistorted_camera
 
 HALF = np.array([2.5, 1.3, 2.0])
 LENS = Camera("FULL_OPENCV", 320, 300, np.array([225.0, 225.0, 160.0, 152.0, -0.126, 0.1, 0, 0, 0.02, 0.2, 0.15, 0.05]))

@@ -6,7 +6,7 @@ import numpy as np
 from box_room import PINHOLE, Room, make_room
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.surfaces.raycast import Raycaster
 
 
 def sighted_room(**arguments) -> Room:

@@ -15,8 +15,8 @@ from app_project import room_mesh, true_poses
 
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.render import RayRenderer
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.render import RayRenderer
 
 VIDEO = "40777060"
 START_S, STEP_S = 305.377, 0.1

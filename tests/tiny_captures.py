@@ -12,8 +12,8 @@ import pycolmap
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 
 ROOM_M = np.array([4.0, 2.6, 3.0])
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * ROOM_M

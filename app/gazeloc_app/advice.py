@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from gazeloc_app.terminal import progress_bar, table
-from gazeloc_core.remembered_quality import remembered_quality
-from gazeloc_core.safe_range import SafeRangeOptions
-from gazeloc_core.tag_advice import RoomOptions, room_map
-from gazeloc_core.user_cache import user_cache
+from gazeloc_core.storage.user_cache import user_cache
+from gazeloc_core.tag_quality.advice import RoomOptions, room_map
+from gazeloc_core.tag_quality.remembered import remembered_quality
+from gazeloc_core.tag_quality.safe_range import SafeRangeOptions
 
 
 def advise(*, width_m: float, length_m: float, focal_px: float, view_deg: float, quick: bool) -> None:

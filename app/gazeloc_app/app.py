@@ -32,21 +32,21 @@ from gazeloc_app.drawing.sources import sources_of
 from gazeloc_app.frames.first_pose import FirstPose
 from gazeloc_app.frames.player import Player
 from gazeloc_app.frames.show_route import add_show_route
-from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.live_alignment import LiveAlignment
 from gazeloc_app.keypoints.loupe import add_loupe_route
 from gazeloc_app.looks import Look
 from gazeloc_app.newest import Newest
 from gazeloc_app.panels.all import Desk, Panels
 from gazeloc_app.panels.help import HelpPanel
+from gazeloc_app.people.view_memory import ViewMemory
+from gazeloc_app.people.visitors import Visitors
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
+from gazeloc_app.scene.kept import EVERYTHING, Kept
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 from gazeloc_app.user_settings import UserSettings
-from gazeloc_app.view_memory import ViewMemory
-from gazeloc_app.visitors import Visitors
 from gazeloc_app.work import tasks
 from gazeloc_app.work.follow_up import ScoreAfterRun
 from gazeloc_app.work.job_list import JobList

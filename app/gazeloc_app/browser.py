@@ -1,4 +1,4 @@
-"""What belongs to one browser: its tool, its clicks, and the camera it looks through (see visitors.py for reloads)."""
+"""What belongs to one browser: its tool, its clicks, and the camera it looks through (people/visitors.py: reloads)."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import viser
 
 from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
-from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.drawing.facing import place_to_stand
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.frames.looking import Looking
-from gazeloc_app.hand import Hand, Reach
-from gazeloc_app.kept import Kept
+from gazeloc_app.keypoints.hand import Hand, Reach
 from gazeloc_app.keypoints.picking import ClickFilter
 from gazeloc_app.panels.looking import LookingControls
 from gazeloc_app.panels.nudging import add_nudges
+from gazeloc_app.scene.cut import Cut
+from gazeloc_app.scene.kept import Kept
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.tools.all import TOOLS, shifted, tools_of
@@ -28,7 +28,7 @@ from gazeloc_app.tools.cloud_point import CloudPointTool
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.keypoints import Point
-from gazeloc_core.viewpoint import room_corners
+from gazeloc_core.surfaces.viewpoint import room_corners
 
 SHIFT = "shift"
 _IN_PAGE = {True: '<div id="gazeloc-tool" data-aims hidden></div>', False: '<div id="gazeloc-tool" hidden></div>'}

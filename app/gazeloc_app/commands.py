@@ -13,17 +13,17 @@ from typing import Any
 from gazeloc_app.terminal import progress_bar, table
 from gazeloc_core import pipeline
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.evaluate import StatusErrors
+from gazeloc_core.evaluation.evaluate import StatusErrors
+from gazeloc_core.evaluation.protocol import ProtocolOptions, make_protocol_project
+from gazeloc_core.evaluation.trajectory_errors import RelativeError
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.methods import method_named
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
-from gazeloc_core.protocol import ProtocolOptions, make_protocol_project
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.stages.recording import own_frames_of_model
 from gazeloc_core.stages.scan import check_tags_can_be_mapped
-from gazeloc_core.tag_sheet import SheetOptions, parse_ids, size_note, write_sheet
-from gazeloc_core.tags import FAMILIES
-from gazeloc_core.trajectory_errors import RelativeError
-from gazeloc_core.truth import read_tum
+from gazeloc_core.tags.detection import FAMILIES
+from gazeloc_core.tags.sheet import SheetOptions, parse_ids, size_note, write_sheet
 
 
 def entry(path: Path, colmap: Path | None, colmap_times: Path | None, truth: Path | None) -> RecordingEntry:

@@ -12,20 +12,18 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.state import Annotation
-from gazeloc_core.alignment import Alignment
+from gazeloc_core.alignment.alignment import Alignment
+from gazeloc_core.alignment.paper_keypoints import SfmTagCenters, sfm_tag_centers
 from gazeloc_core.arrays import Floats, Ints
-from gazeloc_core.artifacts import HEADER, Artifact
 from gazeloc_core.camera import Camera
-from gazeloc_core.chart_file import read_charts
-from gazeloc_core.charts import Drawing
+from gazeloc_core.charts.chart_file import read_charts
+from gazeloc_core.charts.values import Drawing
 from gazeloc_core.errors import GazelocError
-from gazeloc_core.evaluate import evaluate, match_times
-from gazeloc_core.files import read_json
+from gazeloc_core.evaluation.evaluate import evaluate, match_times
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.methods import Method
-from gazeloc_core.paper_keypoints import SfmTagCenters, sfm_tag_centers
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan
 from gazeloc_core.sfm_model import PlacedModel, SfmModel, TrackedFrames
@@ -34,9 +32,11 @@ from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.scores import FORMULA, FrameScores, load_scores
 from gazeloc_core.stages.tracking import load_tracked
+from gazeloc_core.storage.artifacts import HEADER, Artifact
+from gazeloc_core.storage.files import read_json
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.truth import read_tum
 
 T = TypeVar("T")
 FACES_PER_TREE = 50_000

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from gazeloc_app.app import serve
 from gazeloc_core import __version__
-from gazeloc_core.hashing import FileHasher
 from gazeloc_core.project import Project
 from gazeloc_core.resources import sample_scene
-from gazeloc_core.scene_project import scene_settings
-from gazeloc_core.user_cache import user_cache
+from gazeloc_core.storage.hashing import FileHasher
+from gazeloc_core.storage.user_cache import user_cache
+from gazeloc_core.synthesis.scene_project import scene_settings
 
 SCENE = "studio"
 

@@ -11,7 +11,7 @@ import colorsys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import PoseStatus
 

@@ -15,8 +15,8 @@ from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.surfaces.viewpoint import up_vector
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import up_vector
 
 
 def shown_scan_from_sfm(data: ProjectData, state: AppState) -> Similarity | None:

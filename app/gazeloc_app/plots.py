@@ -5,7 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from gazeloc_app.palette import CHART_TEXT, SERIES, hexadecimal
-from gazeloc_core.charts import Chart, Drawing, HeatMap, Series
+from gazeloc_core.charts.values import Chart, Drawing, HeatMap, Series
 
 
 def to_plotly(drawing: Drawing) -> go.Figure:

@@ -13,36 +13,36 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
-from gazeloc_app.dragging import Cloud, Dragging
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.render_worker import Frame
 from gazeloc_app.drawing.scan_screen import ScanScreen
 from gazeloc_app.frames.gaze_at import gaze_in_scan
 from gazeloc_app.frames.settling import Settling
-from gazeloc_app.kept import Kept
+from gazeloc_app.keypoints.dragging import Cloud, Dragging
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
 from gazeloc_app.palette import FILTERED_OUT, SCAN_TAGS, SFM_TAGS
 from gazeloc_app.placement import shown_scan_from_sfm
+from gazeloc_app.scene.cameras import SceneCameras
 from gazeloc_app.scene.cloud import CloudLayer
 from gazeloc_app.scene.frames import SelectedFrameLayer
 from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.grid import GridLayer
+from gazeloc_app.scene.kept import Kept
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
-from gazeloc_app.scene_cameras import SceneCameras
 from gazeloc_app.state import AppState, Layer
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.glb import WHITE
-from gazeloc_core.palette import colors_of_ids
+from gazeloc_core.charts.palette import colors_of_ids
 from gazeloc_core.scan import Mesh
-from gazeloc_core.scan_display import glimpse
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.surfaces.glb import WHITE
+from gazeloc_core.surfaces.scan_display import glimpse
+from gazeloc_core.surfaces.viewpoint import room_corners
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import room_corners
 
 THUMBNAIL_PX = 320
 GLIMPSE_POINTS = 60_000

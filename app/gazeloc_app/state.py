@@ -12,11 +12,11 @@ from enum import StrEnum
 from typing import Any
 
 from gazeloc_app import palette
-from gazeloc_core.glb import Rgb
+from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
-from gazeloc_core.saved_views import SavedView
+from gazeloc_core.surfaces.glb import Rgb
+from gazeloc_core.surfaces.saved_views import SavedView
 
 
 class Layer(StrEnum):

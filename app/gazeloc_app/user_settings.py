@@ -10,8 +10,8 @@ from pathlib import Path
 
 from gazeloc_app.state import AppState
 from gazeloc_core.errors import GazelocError
-from gazeloc_core.files import write_json_atomically
-from gazeloc_core.user_files import read_json_object
+from gazeloc_core.storage.files import write_json_atomically
+from gazeloc_core.storage.user_files import read_json_object
 
 _SAFE_COLORS = "safe_colors"
 _log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from gazeloc_app import palette
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 
 GOOD, WARNING, BAD, MUTED = (palette.meaning(name) for name in palette.TEXT_MEANINGS)
 MARK_COLORS = {Mark.GOOD: GOOD, Mark.BAD: BAD, Mark.UNSURE: WARNING}

@@ -22,8 +22,8 @@ from gazeloc_core.errors import GazelocError, InputError
 from gazeloc_core.experiments.finding import Provenance, inputs_of, write_finding, write_report
 from gazeloc_core.experiments.registry import EXPERIMENTS
 from gazeloc_core.experiments.workspace import Workspace
-from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.progress import Report
+from gazeloc_core.storage.hashing import hash_of_value
 
 
 @dataclass(frozen=True)

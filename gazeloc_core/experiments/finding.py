@@ -13,9 +13,9 @@ from typing import Any, TypeAlias
 import cv2
 
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.charts import Drawing
+from gazeloc_core.charts.values import Drawing
 from gazeloc_core.experiments.plates import draw
-from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.storage.files import read_json, write_json_atomically
 
 Row: TypeAlias = Mapping[str, Any]
 _JPEG_QUALITY = 88

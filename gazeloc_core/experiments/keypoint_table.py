@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from gazeloc_core.evaluation.keypoint_count import KeypointCountOptions
 from gazeloc_core.experiments.finding import Finding
 from gazeloc_core.experiments.workspace import Workspace
-from gazeloc_core.keypoint_count import KeypointCountOptions
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.stages.figures import count_chart, count_errors, count_series

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from gazeloc_core.alignment.paper_keypoints import SfmTagCenters, sfm_tag_centers
 from gazeloc_core.arrays import Bytes
+from gazeloc_core.charts.palette import colors_of_ids
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.overview import View, look_into, side_by_side, with_points
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
-from gazeloc_core.palette import colors_of_ids
-from gazeloc_core.paper_keypoints import SfmTagCenters, sfm_tag_centers
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs

@@ -9,8 +9,10 @@ import numpy as np
 
 from gazeloc_core.arrays import Bools
 from gazeloc_core.errors import GazelocError
-from gazeloc_core.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.experiments.finding import Finding, Row
+from gazeloc_core.experiments.hardness import hardness, plain_colmap_share
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
@@ -19,11 +21,9 @@ from gazeloc_core.stages import inputs
 from gazeloc_core.stages.evaluation import evaluate_recording
 from gazeloc_core.stages.poses import fresh_trajectory
 from gazeloc_core.stages.recording import image_name, load_keyframes
-from gazeloc_core.synthesis.hardness import hardness, plain_colmap_share
 from gazeloc_core.synthesis.routes import RouteName
 from gazeloc_core.synthetic import PRESETS
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.truth import read_tum
 
 METHODS = (Method.TAGS_PAPER, Method.TAGS, Method.SFM_PAPER, Method.SFM)
 

@@ -11,12 +11,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.arrays import Bools, Bytes, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.display_mesh import shaded
-from gazeloc_core.glb import Rgb
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.render import RayRenderer
 from gazeloc_core.scan import Mesh, RoomScan
-from gazeloc_core.viewpoint import facing, overview, up_vector
+from gazeloc_core.surfaces.display_mesh import shaded
+from gazeloc_core.surfaces.glb import Rgb
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.render import RayRenderer
+from gazeloc_core.surfaces.viewpoint import facing, overview, up_vector
 
 SIZE_PX = (960, 720)
 PAPER: Rgb = (255, 255, 255)

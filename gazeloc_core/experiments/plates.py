@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gazeloc_core.charts import Chart, Drawing, HeatMap
+from gazeloc_core.charts.values import Chart, Drawing, HeatMap
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "gazeloc",

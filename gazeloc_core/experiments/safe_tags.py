@@ -5,27 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats
-from gazeloc_core.charts import Chart, Series
+from gazeloc_core.charts.values import Chart, Series
 from gazeloc_core.errors import InputError
-from gazeloc_core.evaluate import match_times
+from gazeloc_core.evaluation.evaluate import match_times
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
-from gazeloc_core.remembered_quality import remembered_quality
-from gazeloc_core.safe_charts import advice_maps, quality_maps
-from gazeloc_core.safe_range import (
+from gazeloc_core.stages import inputs
+from gazeloc_core.stages.scan import tag_entry
+from gazeloc_core.tag_quality.advice import RoomOptions
+from gazeloc_core.tag_quality.charts import advice_maps, quality_maps
+from gazeloc_core.tag_quality.counts import TagCountOptions, tag_counts, true_views
+from gazeloc_core.tag_quality.remembered import remembered_quality
+from gazeloc_core.tag_quality.safe_range import (
     SafeRangeOptions,
     TagQuality,
     is_in_safe_range,
     least_safe_pixels,
     safe_cells,
 )
-from gazeloc_core.stages import inputs
-from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_advice import RoomOptions
-from gazeloc_core.tag_counts import TagCountOptions, tag_counts, true_views
-from gazeloc_core.truth import read_tum
 
 SIZE_M = 0.16
 ROOM_M = (4.0, 5.0)

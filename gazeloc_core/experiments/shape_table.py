@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core import pipeline
-from gazeloc_core.alignment import align
+from gazeloc_core.alignment.alignment import align
+from gazeloc_core.alignment.refine import refine
 from gazeloc_core.arrays import Floats
-from gazeloc_core.clouds import icp_point_to_point, sample_surface
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.localize.global_ import align_global
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
-from gazeloc_core.refine import refine
 from gazeloc_core.stages.case import Case
-from gazeloc_core.surfaces import poisson_surface
+from gazeloc_core.surfaces.clouds import icp_point_to_point, sample_surface
+from gazeloc_core.surfaces.meshing import poisson_surface
 from gazeloc_core.transforms import Similarity
 
 KEYPOINTS = 10

@@ -11,7 +11,6 @@ from gazeloc_core.errors import GeometryError
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.overview import View, look_into, side_by_side, with_points
 from gazeloc_core.experiments.workspace import Workspace
-from gazeloc_core.glb import Rgb
 from gazeloc_core.localize.global_ import GlobalRegistration, align_global
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
@@ -19,7 +18,8 @@ from gazeloc_core.scan import Mesh
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.case import Case
 from gazeloc_core.stages.poses import placed_models
-from gazeloc_core.surfaces import delaunay_surface, poisson_surface
+from gazeloc_core.surfaces.glb import Rgb
+from gazeloc_core.surfaces.meshing import delaunay_surface, poisson_surface
 from gazeloc_core.transforms import Similarity
 
 BLUE: Rgb = (40, 90, 220)

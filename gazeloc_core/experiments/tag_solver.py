@@ -6,10 +6,11 @@ import cv2
 import numpy as np
 
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.charts import Chart
+from gazeloc_core.charts.values import Chart
 from gazeloc_core.experiments.finding import Finding, Row
 from gazeloc_core.experiments.overview import side_by_side
 from gazeloc_core.experiments.workspace import Workspace
+from gazeloc_core.frames.undistort import Undistorter
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
@@ -25,9 +26,8 @@ from gazeloc_core.stages.figures import (
     size_chart,
 )
 from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_analysis import PlaceErrors, SolverAnalysis
-from gazeloc_core.tag_drawing import draw_tags, drawn_tags
-from gazeloc_core.undistort import Undistorter
+from gazeloc_core.tag_quality.analysis import PlaceErrors, SolverAnalysis
+from gazeloc_core.tags.drawing import draw_tags, drawn_tags
 
 _PICTURE_PX = 480
 

@@ -7,20 +7,20 @@ import numpy as np
 
 from gazeloc_core.arrays import Bytes, Ints
 from gazeloc_core.camera import Camera
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.experiments.finding import Finding
 from gazeloc_core.experiments.overview import View, look_into, side_by_side, with_cameras, with_path
 from gazeloc_core.experiments.workspace import Workspace
-from gazeloc_core.glb import Rgb
+from gazeloc_core.frames.undistort import Undistorter
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
-from gazeloc_core.render import RayRenderer
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
+from gazeloc_core.surfaces.glb import Rgb
+from gazeloc_core.surfaces.render import RayRenderer
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import rigid_from_wxyz
-from gazeloc_core.truth import read_tum
-from gazeloc_core.undistort import Undistorter
 
 GREEN: Rgb = (20, 160, 60)
 RED: Rgb = (220, 30, 40)

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Literal
 
 from gazeloc_core import pipeline
-from gazeloc_core.files import folder_replaced_atomically
-from gazeloc_core.hashing import hash_of_value
+from gazeloc_core.evaluation.protocol import make_protocol_project
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
-from gazeloc_core.protocol import make_protocol_project
 from gazeloc_core.resources import sample_scene
-from gazeloc_core.scene_project import scene_settings
+from gazeloc_core.storage.files import folder_replaced_atomically
+from gazeloc_core.storage.hashing import hash_of_value
+from gazeloc_core.synthesis.scene_project import scene_settings
 from gazeloc_core.synthetic import PRESETS, write_scene
 
 SAMPLE = "studio"

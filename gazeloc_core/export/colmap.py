@@ -14,11 +14,11 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Ints
-from gazeloc_core.colmap_io import write_model
 from gazeloc_core.errors import InputError
-from gazeloc_core.export.files import move_all, staging_folder
-from gazeloc_core.frame_notes import HEADINGS, FrameNotes
+from gazeloc_core.export.frame_notes import HEADINGS, FrameNotes
+from gazeloc_core.sfm.colmap_io import write_model
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
+from gazeloc_core.storage.export_files import move_all, staging_folder
 
 MARKER = "gazeloc.txt"
 NOTES_FILE = "frames.csv"

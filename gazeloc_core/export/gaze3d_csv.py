@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.arrays import Floats
-from gazeloc_core.export.files import starts_with, write_text_export
 from gazeloc_core.gaze import GazeInScan
-from gazeloc_core.raycast import NO_FACE
+from gazeloc_core.storage.export_files import starts_with, write_text_export
+from gazeloc_core.surfaces.raycast import NO_FACE
 
 HEADER = (
     "timestamp [ns],origin x [m],origin y [m],origin z [m],direction x,direction y,direction z,"

@@ -19,9 +19,9 @@ import numpy as np
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GeometryError, InputError
-from gazeloc_core.export.files import move_all, refuse_foreign, staging_folder
-from gazeloc_core.frame_notes import FrameNotes
+from gazeloc_core.export.frame_notes import FrameNotes
 from gazeloc_core.progress import Report, silent
+from gazeloc_core.storage.export_files import move_all, refuse_foreign, staging_folder
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 FILE_NAME = "transforms.json"

@@ -13,8 +13,8 @@ import csv
 import io
 from pathlib import Path
 
-from gazeloc_core.export.files import starts_with, write_text_export
-from gazeloc_core.frame_notes import HEADINGS, FrameNotes
+from gazeloc_core.export.frame_notes import HEADINGS, FrameNotes
+from gazeloc_core.storage.export_files import starts_with, write_text_export
 from gazeloc_core.trajectory import Trajectory
 
 _POSES_HEADER = "timestamp [ns],frame index,status,tx [m],ty [m],tz [m],qw,qx,qy,qz"

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gazeloc_core.export.files import starts_with, write_text_export
-from gazeloc_core.frame_notes import FrameNotes
+from gazeloc_core.export.frame_notes import FrameNotes
+from gazeloc_core.storage.export_files import starts_with, write_text_export
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 HEADER = "# GazeLoc: scan_from_camera; timestamp tx ty tz qx qy qz qw"

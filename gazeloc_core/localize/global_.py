@@ -20,10 +20,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.arrays import Floats, frozen
-from gazeloc_core.clouds import icp_point_to_point, ransac_of_features, sample_surface
 from gazeloc_core.errors import GeometryError, InputError
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.clouds import icp_point_to_point, ransac_of_features, sample_surface
 from gazeloc_core.transforms import Similarity
 
 
@@ -99,7 +99,7 @@ def align_global(
     scale: float | None = None,
     report: Report = silent,
 ) -> GlobalRegistration:
-    """`scan_from_sfm` from the shapes of a reconstruction's surface (`surfaces.py`) and of the scan.
+    """`scan_from_sfm` from the shapes of a reconstruction's surface (`surfaces/meshing.py`) and of the scan.
 
     `scale` in metres per unit of the reconstruction, where it is known. The same seed gives the same answer.
 

@@ -1,9 +1,9 @@
 """Method `sfm-paper`: the reconstruction aligned as in the paper's figure 10, the faithful baseline beside `sfm`.
 
-Tag centres of both sides (`paper_keypoints.py`) give scale, rotation and place by Umeyama's closed form, over all
-common tags, whoever is wrong among them; the points are scaled by that, and point-to-point ICP against points sampled
-on the scan's mesh has the last word. The paper takes ICP's answer always. So does this; what it did to the alignment is
-in the evidence on both.
+Tag centres of both sides (`alignment/paper_keypoints.py`) give scale, rotation and place by Umeyama's closed form, over
+all common tags, whoever is wrong among them; the points are scaled by that, and point-to-point ICP against points
+sampled on the scan's mesh has the last word. The paper takes ICP's answer always. So does this; what it did to the
+alignment is in the evidence on both.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from gazeloc_core.alignment import Alignment, AlignmentMethod, AlignOptions, align, judge
-from gazeloc_core.clouds import icp_point_to_point, sample_surface
-from gazeloc_core.correspondences import Correspondences
+from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, AlignOptions, align, judge
+from gazeloc_core.alignment.correspondences import Correspondences
+from gazeloc_core.alignment.paper_keypoints import TagCenters, center_pairs
+from gazeloc_core.alignment.similarity_fit import RobustOptions
 from gazeloc_core.errors import GeometryError, InputError
-from gazeloc_core.paper_keypoints import TagCenters, center_pairs
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import RobustOptions
+from gazeloc_core.surfaces.clouds import icp_point_to_point, sample_surface
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,11 +18,11 @@ import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats, Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.resection import CameraPoses, SeenSquares, TagErrors, resect
-from gazeloc_core.tag_pose import normalised_corners, tag_poses
-from gazeloc_core.tag_square import rotation_of_square
+from gazeloc_core.localize.resection import CameraPoses, SeenSquares, TagErrors, resect
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
+from gazeloc_core.tags.pose import normalised_corners, tag_poses
+from gazeloc_core.tags.square import rotation_of_square
 
 _MOST_PER_FRAME = 6
 _SAME_M = 0.03

@@ -8,8 +8,8 @@ import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats, Ints, frozen
 from gazeloc_core.errors import GeometryError
+from gazeloc_core.localize.resection import CameraPoses, SeenSquares, distances_m, errors_px
 from gazeloc_core.localize.sfm import frame_mask
-from gazeloc_core.resection import CameraPoses, SeenSquares, distances_m, errors_px
 from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 from gazeloc_core.transforms import rigid, rotation_from_matrix

@@ -7,7 +7,7 @@ has inertia. So one least-squares problem holds, for every frame with a tag, its
 - that velocity changes little between neighbours in time (white noise on acceleration: Barfoot, "State estimation for
   robotics", 2017, section 3.4), by the root of the time between them, so that a long gap ties nothing;
 - one unknown shift of all edges: light bleeds over dark edges, so that a tag looks smaller than it is and thus further
-  away (see `tag_bundle.py`).
+  away (see `tags/bundle.py`).
 
 A frame is tied to its neighbours, never made from them: it is here only because it sees a tag itself.
 
@@ -23,7 +23,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.arrays import Bools, Floats
-from gazeloc_core.resection import (
+from gazeloc_core.localize.resection import (
     CameraPoses,
     SeenSquares,
     TagErrors,

@@ -17,6 +17,7 @@ import numpy as np
 
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.camera import Camera
+from gazeloc_core.localize.resection import TagErrors
 from gazeloc_core.localize.tag_candidates import Candidates, MappedSightings, WallOptions, find_candidates
 from gazeloc_core.localize.tag_localization import (
     LocalizedFrames,
@@ -28,8 +29,7 @@ from gazeloc_core.localize.tag_localization import (
 from gazeloc_core.localize.tag_path import NO_CANDIDATE, PathOptions, are_tied, choose_path
 from gazeloc_core.localize.tag_smoother import SmootherOptions, TagChain, smooth
 from gazeloc_core.progress import Report, silent
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.resection import TagErrors
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
 
 _OFTEN = 0.3

@@ -21,6 +21,7 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_core.arrays import Bools, Floats, Ints
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GeometryError, InputError
+from gazeloc_core.localize.resection import CameraPoses, SeenSquares
 from gazeloc_core.localize.tag_localization import (
     LocalizedFrames,
     TagLocalization,
@@ -29,11 +30,10 @@ from gazeloc_core.localize.tag_localization import (
     unmapped_note,
 )
 from gazeloc_core.progress import Report, silent
-from gazeloc_core.resection import CameraPoses, SeenSquares
 from gazeloc_core.scan import RoomScan
-from gazeloc_core.tag_pose import TagPoses, apriltag_poses, checked_tag_size, normalised_corners
-from gazeloc_core.tag_square import UNIT_SQUARE
 from gazeloc_core.tag_types import TagSightings
+from gazeloc_core.tags.pose import TagPoses, apriltag_poses, checked_tag_size, normalised_corners
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 
 @dataclass(frozen=True, kw_only=True)

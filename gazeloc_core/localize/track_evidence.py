@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bools, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.frame_pose import FramePose
+from gazeloc_core.localize.frame_pose import FramePose
 from gazeloc_core.transforms import rotation_angle_rad
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.camera import Camera
+from gazeloc_core.frames.undistort import project_valid
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.undistort import project_valid
 
 _OFF_PX = 4.0
 """A point that the reconstruction itself puts this far from where the image shows it is not carried."""

@@ -23,11 +23,11 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bools, Bytes, Floats, Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.frame_pose import FramePose, FramePoseOptions, frame_pose
+from gazeloc_core.frames.point_flow import FlowOptions, carry
+from gazeloc_core.localize.frame_pose import FramePose, FramePoseOptions, frame_pose
 from gazeloc_core.localize.stretches import Stretch, stretches
 from gazeloc_core.localize.track_evidence import EvidenceOptions, KnownPose, Refusal, refusal
 from gazeloc_core.localize.track_points import ImagePoints
-from gazeloc_core.point_flow import FlowOptions, carry
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.recording import Recording
 from gazeloc_core.sfm_model import SfmModel, TrackedFrames

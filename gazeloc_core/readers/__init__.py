@@ -13,7 +13,7 @@ from gazeloc_core.readers import arkitscenes, image_folder, mesh_file, pupil_clo
 from gazeloc_core.readers.depth_check import DepthAgreement, depth_agreement
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import RoomScan
-from gazeloc_core.scan_colors import color_from_frames
+from gazeloc_core.surfaces.scan_colors import color_from_frames
 
 __all__ = ["DepthAgreement", "depth_agreement", "open_recording", "open_scan"]
 

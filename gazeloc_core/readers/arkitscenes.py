@@ -31,9 +31,9 @@ from gazeloc_core.readers.depth_check import checked_against_depth
 from gazeloc_core.readers.mesh_file import mesh_through_trimesh
 from gazeloc_core.readers.pictures import camera_at_size, size_of
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
+from gazeloc_core.storage.user_files import about, read_text
 from gazeloc_core.times import nearest_rows
 from gazeloc_core.transforms import rigid
-from gazeloc_core.user_files import about, read_text
 
 FORMAT = "ARKitScenes"
 TRAJECTORY = "lowres_wide.traj"

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import RoomScan, ScanFrame
+from gazeloc_core.surfaces.raycast import Raycaster
 
 FRAMES_CHECKED = 10
 PIXELS_CHECKED = 2000

@@ -12,13 +12,13 @@ import numpy as np
 
 from gazeloc_core.arrays import Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.colmap_format import read_cameras_text
 from gazeloc_core.errors import InputError
-from gazeloc_core.frames import ImageFrames
+from gazeloc_core.frames.sources import ImageFrames
 from gazeloc_core.readers.pictures import size_of
 from gazeloc_core.readers.pupil_files import read_gaze, read_scene_camera
 from gazeloc_core.recording import Recording
-from gazeloc_core.user_files import nanoseconds_of, natural_key, read_csv, read_json_object
+from gazeloc_core.sfm.colmap_format import read_cameras_text
+from gazeloc_core.storage.user_files import nanoseconds_of, natural_key, read_csv, read_json_object
 
 FORMAT = "image folder"
 CAMERA_FILES = ("camera.json", "scene_camera.json", "cameras.txt")

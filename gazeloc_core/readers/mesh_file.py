@@ -12,7 +12,7 @@ from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report
 from gazeloc_core.readers.obj_file import mesh_of, pictures_of, read_obj
 from gazeloc_core.scan import Mesh, RoomScan, Texture
-from gazeloc_core.user_files import about, read_bytes
+from gazeloc_core.storage.user_files import about, read_bytes
 
 ENDINGS = (".ply", ".obj", ".glb", ".stl")
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gazeloc_core.arrays import Bytes, Floats, Ints
 from gazeloc_core.errors import InputError
 from gazeloc_core.scan import Mesh, Texture
-from gazeloc_core.user_files import about, read_bytes, read_text
+from gazeloc_core.storage.user_files import about, read_bytes, read_text
 
 REMEDY = "the file is cut off or damaged, export it again"
 

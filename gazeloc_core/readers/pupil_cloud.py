@@ -9,10 +9,10 @@ import numpy as np
 
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.errors import InputError
-from gazeloc_core.frames import VideoFrames
+from gazeloc_core.frames.sources import VideoFrames
 from gazeloc_core.readers.pupil_files import TIME, read_gaze, read_scene_camera
 from gazeloc_core.recording import Recording
-from gazeloc_core.user_files import nanoseconds_of, read_csv
+from gazeloc_core.storage.user_files import nanoseconds_of, read_csv
 
 FORMAT = "Pupil Cloud export"
 TIMES_FILE, CAMERA_FILE, GAZE_FILE = "world_timestamps.csv", "scene_camera.json", "gaze.csv"

@@ -13,7 +13,7 @@ from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import HALF_PIXEL, Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.recording import Gaze
-from gazeloc_core.user_files import AGAIN, nanoseconds_of, numbers_of, read_csv, read_json_object
+from gazeloc_core.storage.user_files import AGAIN, nanoseconds_of, numbers_of, read_csv, read_json_object
 
 TIME = "timestamp [ns]"
 COEFFICIENT_KEYS = ("dist_coefs", "distortion_coefficients")

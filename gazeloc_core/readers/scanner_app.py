@@ -21,8 +21,8 @@ from gazeloc_core.readers.mesh_file import missing_pictures
 from gazeloc_core.readers.obj_file import mesh_of, pictures_of, read_mtl, read_obj
 from gazeloc_core.readers.pictures import camera_at_size, size_of
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
+from gazeloc_core.storage.user_files import about, numbers_of, read_json_object
 from gazeloc_core.transforms import rigid_from_matrix
-from gazeloc_core.user_files import about, numbers_of, read_json_object
 
 FORMAT = "3D Scanner App"
 FRAME_FILES = "frame_*.json"

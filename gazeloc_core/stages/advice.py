@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from gazeloc_core.chart_file import write_charts
-from gazeloc_core.charts import Drawing
+from gazeloc_core.charts.chart_file import write_charts
+from gazeloc_core.charts.values import Drawing
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
-from gazeloc_core.remembered_quality import remembered_quality
-from gazeloc_core.safe_charts import advice_maps, quality_maps
-from gazeloc_core.safe_range import SafeRangeOptions
 from gazeloc_core.scan import RoomScan
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_advice import RoomOptions
-from gazeloc_core.viewpoint import up_vector
+from gazeloc_core.surfaces.viewpoint import up_vector
+from gazeloc_core.tag_quality.advice import RoomOptions
+from gazeloc_core.tag_quality.charts import advice_maps, quality_maps
+from gazeloc_core.tag_quality.remembered import remembered_quality
+from gazeloc_core.tag_quality.safe_range import SafeRangeOptions
 
 TITLES = {
     "detection": "Section IX, detection",

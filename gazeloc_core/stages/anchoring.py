@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from gazeloc_core.anchoring import Anchoring, AnchoringOptions, bend_to_tags
+from gazeloc_core.bending.anchoring import Anchoring, AnchoringOptions, bend_to_tags
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
-from gazeloc_core.tag_corners import triangulate_sfm_corners
+from gazeloc_core.tags.corners import triangulate_sfm_corners
 
 
 def anchor_reconstruction(

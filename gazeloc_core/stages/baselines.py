@@ -10,17 +10,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gazeloc_core.alignment import Alignment, AlignmentMethod, AlignOptions, judge
-from gazeloc_core.files import read_json, write_json_atomically
+from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, AlignOptions, judge
+from gazeloc_core.alignment.paper_keypoints import scan_tag_centers, sfm_tag_centers
 from gazeloc_core.localize.global_ import GlobalOptions, GlobalRegistration, align_global
 from gazeloc_core.localize.sfm_paper import AlignPaperOptions, PaperAlignment, align_paper
 from gazeloc_core.methods import Method
-from gazeloc_core.paper_keypoints import scan_tag_centers, sfm_tag_centers
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.registration import correspondences
-from gazeloc_core.surfaces import delaunay_surface, poisson_surface
+from gazeloc_core.storage.files import read_json, write_json_atomically
+from gazeloc_core.surfaces.meshing import delaunay_surface, poisson_surface
 
 _FILE = "alignment.json"
 

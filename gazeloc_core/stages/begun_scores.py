@@ -11,10 +11,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from gazeloc_core.agreement import Agreement
 from gazeloc_core.arrays import Floats
-from gazeloc_core.files import write_bytes_atomically
-from gazeloc_core.picture_tiles import TABLE_WIDTH, Tiles
+from gazeloc_core.evaluation.agreement import Agreement
+from gazeloc_core.evaluation.picture_tiles import TABLE_WIDTH, Tiles
+from gazeloc_core.storage.files import write_bytes_atomically
 
 COLUMNS = tuple(field.name for field in fields(Agreement))
 _KEEP_EVERY_S = 5.0

@@ -11,12 +11,12 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from gazeloc_core.artifacts import Artifact
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.files import write_bytes_atomically
 from gazeloc_core.localize.track_evidence import Refusal
 from gazeloc_core.localize.tracking import TRACKED_COLUMNS, Tracking, joined
 from gazeloc_core.sfm_model import TrackedFrames
+from gazeloc_core.storage.artifacts import Artifact
+from gazeloc_core.storage.files import write_bytes_atomically
 
 _KEEP_EVERY_S = 10.0
 

@@ -8,18 +8,18 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_core.alignment.correspondences import Correspondences
+from gazeloc_core.alignment.icp import IcpOptions, Target, choose_points
+from gazeloc_core.alignment.similarity_fit import fit_similarity
 from gazeloc_core.arrays import Floats, Ints
-from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.errors import GeometryError, InputError
-from gazeloc_core.evaluate import match_times, pose_errors
-from gazeloc_core.icp import IcpOptions, Target, choose_points
+from gazeloc_core.evaluation.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import fit_similarity
 from gazeloc_core.stages import inputs
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.truth import read_tum
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.arrays import Floats
-from gazeloc_core.artifacts import State
-from gazeloc_core.display_mesh import MAX_FACES
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.glb import Glb
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.scan import Mesh, RoomScan
-from gazeloc_core.scan_display import ScanDisplay, scan_display
 from gazeloc_core.stages import inputs
+from gazeloc_core.storage.artifacts import State
+from gazeloc_core.surfaces.display_mesh import MAX_FACES
+from gazeloc_core.surfaces.glb import Glb
+from gazeloc_core.surfaces.scan_display import ScanDisplay, scan_display
 
 _FILE = "scan.glb"
 

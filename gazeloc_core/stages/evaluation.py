@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from gazeloc_core.errors import GazelocError, InputError
-from gazeloc_core.evaluate import Evaluation, evaluate
+from gazeloc_core.evaluation.evaluate import Evaluation, evaluate
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
 from gazeloc_core.stages.registration import chosen_alignment
-from gazeloc_core.truth import read_tum
-from gazeloc_core.user_files import about
+from gazeloc_core.storage.user_files import about
 
 
 def evaluate_recording(

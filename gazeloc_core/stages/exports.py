@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.artifacts import State
 from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.export.colmap import write_colmap
+from gazeloc_core.export.frame_notes import FrameNotes
 from gazeloc_core.export.gaze3d_csv import write_gaze3d_csv
 from gazeloc_core.export.nerfstudio import registered_frames, write_nerfstudio
 from gazeloc_core.export.poses_csv import write_poses_csv
 from gazeloc_core.export.tum import write_tum
-from gazeloc_core.frame_notes import FrameNotes
+from gazeloc_core.frames.undistort import Undistorter
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
@@ -24,7 +24,7 @@ from gazeloc_core.stages import inputs
 from gazeloc_core.stages.gaze import gaze_inputs
 from gazeloc_core.stages.poses import fresh_trajectory, placed_models
 from gazeloc_core.stages.scores import fresh_scores
-from gazeloc_core.undistort import Undistorter
+from gazeloc_core.storage.artifacts import State
 
 
 def export(

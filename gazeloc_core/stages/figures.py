@@ -11,17 +11,22 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.chart_file import write_charts
-from gazeloc_core.charts import Chart, Drawing, Series
+from gazeloc_core.charts.chart_file import write_charts
+from gazeloc_core.charts.values import Chart, Drawing, Series
 from gazeloc_core.errors import GazelocError, InputError
-from gazeloc_core.keypoint_count import KeypointCountErrors, KeypointCountOptions, exact_pairs, keypoint_count_errors
+from gazeloc_core.evaluation.keypoint_count import (
+    KeypointCountErrors,
+    KeypointCountOptions,
+    exact_pairs,
+    keypoint_count_errors,
+)
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.case import Case
 from gazeloc_core.stages.poses import fresh_methods, fresh_trajectory
 from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_analysis import PlaceErrors, SolverAnalysis, analyse_solver, tag_place_errors
+from gazeloc_core.tag_quality.analysis import PlaceErrors, SolverAnalysis, analyse_solver, tag_place_errors
 from gazeloc_core.tag_types import TagSightings
 
 

@@ -13,17 +13,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gazeloc_core.artifacts import Artifact
 from gazeloc_core.camera import Camera
-from gazeloc_core.files import read_json
 from gazeloc_core.gaze import GazeInScan
-from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh, RoomScan, Texture
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.storage.artifacts import Artifact
+from gazeloc_core.storage.files import read_json
+from gazeloc_core.storage.hashing import hash_of_value
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import rigid_from_wxyz, wxyz_of

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from gazeloc_core.alignment import Alignment, AlignOptions
+from gazeloc_core.alignment.alignment import Alignment, AlignOptions
+from gazeloc_core.bending.pieces import Piece, PieceOptions, place_pieces
 from gazeloc_core.errors import ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
-from gazeloc_core.pieces import Piece, PieceOptions, place_pieces
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.tracking import load_tracked
+from gazeloc_core.storage.files import read_json, write_json_atomically
 
 _FILE = "pieces.json"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 
-from gazeloc_core.artifacts import Artifact, State
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
 from gazeloc_core.methods import Method
@@ -19,6 +18,7 @@ from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.registration import chosen_alignment
 from gazeloc_core.stages.tags import tags_inputs, tags_paper_inputs
 from gazeloc_core.stages.tracking import load_tracked, tracked_content
+from gazeloc_core.storage.artifacts import Artifact, State
 from gazeloc_core.trajectory import Trajectory
 
 

@@ -10,23 +10,23 @@ import cv2
 import numpy as np
 
 from gazeloc_core.arrays import Ints
-from gazeloc_core.colmap_io import read_model
-from gazeloc_core.colmap_join import join_to_recording
 from gazeloc_core.errors import InputError
-from gazeloc_core.files import write_json_atomically
-from gazeloc_core.keyframes import KeyframeOptions, choose_keyframes, measure_frames
+from gazeloc_core.frames.undistort import Undistorter, UndistortOptions
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.recording import Recording
-from gazeloc_core.sfm import SfmOptions, reconstruct
-from gazeloc_core.sfm_bridges import MoreFrames, spaced
+from gazeloc_core.sfm.bridges import MoreFrames, spaced
+from gazeloc_core.sfm.colmap_io import read_model
+from gazeloc_core.sfm.colmap_join import join_to_recording
+from gazeloc_core.sfm.keyframes import KeyframeOptions, choose_keyframes, measure_frames
+from gazeloc_core.sfm.reconstruction import SfmOptions, reconstruct
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.scan import tag_entry
-from gazeloc_core.tag_corners import SfmCornerOptions, triangulate_sfm_corners
-from gazeloc_core.tags import TagOptions, detect_tags
-from gazeloc_core.undistort import Undistorter, UndistortOptions
-from gazeloc_core.user_files import about
+from gazeloc_core.storage.files import write_json_atomically
+from gazeloc_core.storage.user_files import about
+from gazeloc_core.tags.corners import SfmCornerOptions, triangulate_sfm_corners
+from gazeloc_core.tags.detection import TagOptions, detect_tags
 
 JPEG_QUALITY = 95
 BRIDGES_HZ = 15.0

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from gazeloc_core.alignment import Alignment, AlignOptions, align
-from gazeloc_core.correspondences import Correspondences, gather
+from gazeloc_core.alignment.alignment import Alignment, AlignOptions, align
+from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.refine import Refinement, RefineOptions, refine
 from gazeloc_core.errors import GeometryError, ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Chosen, Project
-from gazeloc_core.refine import Refinement, RefineOptions, refine
 from gazeloc_core.stages import inputs
+from gazeloc_core.storage.files import read_json, write_json_atomically
 
 
 def save_alignment(project: Project, recording: str, alignment: Alignment) -> None:

@@ -8,10 +8,10 @@ from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project, TagEntry
 from gazeloc_core.scan import RoomScan
-from gazeloc_core.scan_colors import color_from_frames
 from gazeloc_core.stages import inputs
-from gazeloc_core.tag_corners import ScanCornerOptions, map_scan_corners
-from gazeloc_core.tags import TagOptions, detect_tags
+from gazeloc_core.surfaces.scan_colors import color_from_frames
+from gazeloc_core.tags.corners import ScanCornerOptions, map_scan_corners
+from gazeloc_core.tags.detection import TagOptions, detect_tags
 
 
 def tag_entry(project: Project) -> TagEntry:

@@ -13,18 +13,18 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_core.agreement import AgreementOptions, FrameScorer
 from gazeloc_core.arrays import Bools, Floats, Ints
-from gazeloc_core.artifacts import Artifact, State
 from gazeloc_core.errors import ProjectError
-from gazeloc_core.hashing import hash_of_value
+from gazeloc_core.evaluation.agreement import AgreementOptions, FrameScorer
+from gazeloc_core.evaluation.scan_distortion import ScanDistortion, scan_distortion
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.recording import Recording
-from gazeloc_core.scan_distortion import ScanDistortion, scan_distortion
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.begun_scores import COLUMNS, BegunScores
+from gazeloc_core.storage.artifacts import Artifact, State
+from gazeloc_core.storage.hashing import hash_of_value
 from gazeloc_core.trajectory import Trajectory
 
 FORMULA = "2"

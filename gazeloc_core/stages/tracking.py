@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.hashing import hash_of_value
 from gazeloc_core.localize.tracking import TRACKED_COLUMNS, Tracking, TrackingOptions, track_stretches
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.sfm_model import TrackedFrames
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.begun_tracking import BegunTracking
+from gazeloc_core.storage.hashing import hash_of_value
 
 
 def track_between(

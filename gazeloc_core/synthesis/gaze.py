@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.arrays import Bools, Floats, Ints
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.synthesis.glasses import START_NS, GlassesCapture
 from gazeloc_core.synthesis.room import Room
 

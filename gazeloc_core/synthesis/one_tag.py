@@ -19,8 +19,8 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.synthesis.glasses import noisy
 from gazeloc_core.synthesis.textures import linear
 from gazeloc_core.synthesis.textures import noise as smooth_noise
-from gazeloc_core.tag_bitmaps import TagBitmap
-from gazeloc_core.tag_square import UNIT_SQUARE
+from gazeloc_core.tags.bitmaps import TagBitmap
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 PAPER, INK, WALL = 236.0, 22.0, 165.0
 """sRGB of what is seen, in full light."""

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from gazeloc_core.arrays import Bytes, Floats, frozen
 from gazeloc_core.synthesis.geometry import Patch, quad
 from gazeloc_core.synthesis.textures import picture
-from gazeloc_core.tag_bitmaps import tag_bitmap
+from gazeloc_core.tags.bitmaps import tag_bitmap
 
 FAMILY = "tag36h11"
 MODULES = 8

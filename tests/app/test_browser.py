@@ -25,8 +25,8 @@ from gazeloc_app.tools.tool import Click, Tool
 from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
+from gazeloc_core.surfaces.raycast import Raycaster
 
 CAMERA = Camera.pinhole(960, 720, 720, 720, 470, 350)
 PLACE = np.array([0.1, 0.2, 2.5])

@@ -19,7 +19,7 @@ from tiny_arkitscenes import write_arkitscenes
 from tiny_captures import write_scan
 
 from gazeloc_core import __version__, pipeline
-from gazeloc_core.marks import FrameMark, FrameMarks, Mark
+from gazeloc_core.frames.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.stages.registration import align_keypoints

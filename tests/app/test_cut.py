@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from gazeloc_app.cut import Cut
-from gazeloc_app.kept import EVERYTHING, Kept, Plane
 from gazeloc_app.keypoints.picking import pick_cloud, pick_frustum, pick_mesh
 from gazeloc_app.keypoints.snapping import snap
 from gazeloc_app.routes import Routes
+from gazeloc_app.scene.cut import Cut
+from gazeloc_app.scene.kept import EVERYTHING, Kept, Plane
 from gazeloc_app.server import make_server
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 

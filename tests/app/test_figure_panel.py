@@ -8,7 +8,7 @@ from gazeloc_app.routes import Routes
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState
 
-from gazeloc_core.charts import Chart, Series
+from gazeloc_core.charts.values import Chart, Series
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from gazeloc_core.display_mesh import display_mesh
-from gazeloc_core.glb import linear_from_srgb, lines_glb, mesh_glb, wires_glb
 from gazeloc_core.scan import Mesh, Texture
+from gazeloc_core.surfaces.display_mesh import display_mesh
+from gazeloc_core.surfaces.glb import linear_from_srgb, lines_glb, mesh_glb, wires_glb
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0.5]])
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)

@@ -16,9 +16,9 @@ from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.frames.frame_marks import view_of
 from gazeloc_app.frames.frame_snapping import snap_pixel
 from gazeloc_app.frames.looking import Target
-from gazeloc_app.hand import Hand, Reach
+from gazeloc_app.keypoints.hand import Hand, Reach
 from gazeloc_app.keypoints.loupe import ACROSS_M, loupe_places
-from gazeloc_app.moving import Nudge
+from gazeloc_app.keypoints.moving import Nudge
 from gazeloc_app.panels.looking import LookingControls
 
 from gazeloc_core.errors import InputError

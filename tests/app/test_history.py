@@ -20,10 +20,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazeloc_core.errors import InputError
+from gazeloc_core.frames.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
-from gazeloc_core.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.methods import Method
-from gazeloc_core.saved_views import SavedView
+from gazeloc_core.surfaces.saved_views import SavedView
 
 PAIR = KeypointPair(
     "k1", "corner", (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (Sighting(3, 10.5, 20.5),), 0.01, False, (Sighting(1, 2, 3),), 0.2

@@ -16,7 +16,7 @@ from gazeloc_app.cli import main
 from gazeloc_app.panels.keypoint_files import FORMATS, KeypointFiles
 from gazeloc_app.state import Level
 
-from gazeloc_core.keypoint_files import WRITERS, read_keypoints
+from gazeloc_core.clicks.keypoint_files import WRITERS, read_keypoints
 from gazeloc_core.project import Project
 
 LIST = b"lamp,1,2,0.5\ndesk,0.5,0.25,2\n"

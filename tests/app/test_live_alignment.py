@@ -17,8 +17,8 @@ from gazeloc_app.app import App
 from gazeloc_app.keypoints.live_alignment import is_following
 from gazeloc_app.keypoints.residuals import pair_residuals
 
-from gazeloc_core.alignment import AlignmentMethod, judge
-from gazeloc_core.correspondences import gather
+from gazeloc_core.alignment.alignment import AlignmentMethod, judge
+from gazeloc_core.alignment.correspondences import gather
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.stages.registration import save_alignment
 from gazeloc_core.transforms import Similarity

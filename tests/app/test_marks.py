@@ -11,7 +11,7 @@ from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.annotation.steps import describe
 from gazeloc_app.app import App
 
-from gazeloc_core.marks import FrameMark, Mark
+from gazeloc_core.frames.marks import FrameMark, Mark
 
 
 def marks(app):

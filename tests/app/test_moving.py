@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.picks import MovePoint, PickPoint, Side
-from gazeloc_app.dragging import Cloud, Dragging
-from gazeloc_app.kept import EVERYTHING, Kept, Plane
+from gazeloc_app.keypoints.dragging import Cloud, Dragging
+from gazeloc_app.keypoints.moving import ARROWS, Nudge, dragged, nudged, nudged_in_view
 from gazeloc_app.keypoints.snapping import snap
-from gazeloc_app.moving import ARROWS, Nudge, dragged, nudged, nudged_in_view
+from gazeloc_app.scene.kept import EVERYTHING, Kept, Plane
 from gazeloc_app.state import AppState, Level
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.keypoints import Sighting
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 

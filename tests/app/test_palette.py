@@ -10,8 +10,8 @@ from gazeloc_app.looks import set_theme
 from gazeloc_app.plots import to_plotly
 from viser._messages import ThemeConfigurationMessage
 
-from gazeloc_core.charts import Chart, Series
-from gazeloc_core.marks import Mark
+from gazeloc_core.charts.values import Chart, Series
+from gazeloc_core.frames.marks import Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import PoseStatus
 

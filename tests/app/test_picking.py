@@ -6,8 +6,8 @@ from gazeloc_app.keypoints import picking
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 
 CAMERA = Camera.pinhole(1280, 960, 900.0, 905.0, 650.0, 470.0)
 POSE = RigidTransform.from_components([1.0, -2.0, 0.5], Rotation.from_euler("xyz", [20, 130, -35], degrees=True))

@@ -14,7 +14,7 @@ from gazeloc_app.app import App
 from gazeloc_app.panels.problems import ProblemPanel, Which
 from gazeloc_app.work import tasks
 
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 from gazeloc_core.project import Chosen
 from gazeloc_core.stages.registration import align_keypoints
 

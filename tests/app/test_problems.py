@@ -19,7 +19,7 @@ from gazeloc_app.frames.problems import frame_table, next_problem, worst_first
 from gazeloc_app.frames.timeline_html import PARTS, STATUS_COLORS, timeline_html
 from gazeloc_app.panels.frames import FramePanel
 
-from gazeloc_core.marks import FrameMark, FrameMarks, Mark
+from gazeloc_core.frames.marks import FrameMark, FrameMarks, Mark
 from gazeloc_core.trajectory import Trajectory
 
 

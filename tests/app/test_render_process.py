@@ -15,10 +15,10 @@ from gazeloc_app.drawing.render_worker import Cast, Describe, Frame, Render, Sou
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GazelocError, InputError, RenderError
-from gazeloc_core.frames import ImageFrames
+from gazeloc_core.frames.sources import ImageFrames
+from gazeloc_core.frames.undistort import Undistorter
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import Mesh
-from gazeloc_core.undistort import Undistorter
 
 LENS = Camera("FULL_OPENCV", 272, 270, np.array([190, 190, 136, 135, -0.13, 0.11, 0, 0, 0, 0.17, 0.05, 0.02]))
 PINHOLE = Camera.pinhole(160, 120, 100, 100, 80, 60)

@@ -12,7 +12,7 @@ from gazeloc_app.annotation.room_saving import RoomSaver
 from gazeloc_app.annotation.saving import Saver
 from gazeloc_app.state import AppState, Layer
 
-from gazeloc_core.saved_views import SavedView
+from gazeloc_core.surfaces.saved_views import SavedView
 
 NAMES = ("walk", "sit")
 CORNER = SavedView("corner", (1.0, 1.0, 1.0), (2.0, 1.0, 1.0))

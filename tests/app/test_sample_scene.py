@@ -11,17 +11,17 @@ import pytest
 from data import SAMPLE_SCENES
 
 from gazeloc_core import pipeline
-from gazeloc_core.artifacts import State
 from gazeloc_core.camera import Camera
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.experiments.__main__ import Arguments
 from gazeloc_core.experiments.__main__ import run as run_experiments
 from gazeloc_core.experiments.registry import EXPERIMENTS
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
-from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.stages import inputs, registration
+from gazeloc_core.storage.artifacts import State
+from gazeloc_core.synthesis.scene_project import scene_settings
 from gazeloc_core.trajectory import PoseStatus
-from gazeloc_core.truth import read_tum
 
 STUDIO = SAMPLE_SCENES / "studio"
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not STUDIO.is_dir(), reason="sample_scenes/studio is not there")]

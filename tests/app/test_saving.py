@@ -15,10 +15,10 @@ from gazeloc_app.annotation.saving import Saver, annotation_in_files
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 
-from gazeloc_core.journal import Journal
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
+from gazeloc_core.storage.journal import Journal
 
 
 @pytest.fixture(scope="module")

@@ -17,12 +17,12 @@ from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.glb import mesh_glb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.scan import Mesh, Texture
+from gazeloc_core.surfaces.glb import mesh_glb
+from gazeloc_core.surfaces.viewpoint import facing
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import facing
 
 CAMERA = Camera.pinhole(320, 240, 260.0, 250.0, 170.0, 112.0)
 BOX = Mesh(

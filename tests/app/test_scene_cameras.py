@@ -18,9 +18,9 @@ from gazeloc_app.state import AppState, Coloring, Layer
 from gazeloc_app.user_settings import UserSettings, settings_path
 
 from gazeloc_core.errors import GazelocError
-from gazeloc_core.glb import linear_from_srgb
 from gazeloc_core.methods import Method
 from gazeloc_core.stages import inputs
+from gazeloc_core.surfaces.glb import linear_from_srgb
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 
@@ -70,7 +70,7 @@ def test_every_nth_camera_is_drawn_and_the_path_through_all(app):
 
 
 def test_more_cameras_than_leave_the_room_to_be_seen_are_thinned_by_themselves(app, monkeypatch):
-    monkeypatch.setattr("gazeloc_app.scene_cameras.MANY", 10)
+    monkeypatch.setattr("gazeloc_app.scene.cameras.MANY", 10)
     frames = len(app.data.recording("walk"))
     assert app.scene.cameras.thinning(app.store.state) == -(-frames // 10)
 

@@ -15,7 +15,7 @@ from gazeloc_app.app import App
 from gazeloc_app.drawing.facing import place_to_stand
 from gazeloc_app.keypoints.suggestions import Proposals, reason
 
-from gazeloc_core.next_keypoint import Suggestion, Weakness
+from gazeloc_core.alignment.next_keypoint import Suggestion, Weakness
 
 ON_SCAN = [(1.0, 0.02, 1.5), (0.02, 0.9, 1.6), (3.0, 0.02, 1.1), (0.9, 0.3, 0.76)]
 UP = np.array([0.0, 0.0, 1.0])

@@ -17,8 +17,8 @@ from gazeloc_app.routes import Routes
 from gazeloc_app.server import make_server
 from gazeloc_app.state import Annotation, AppState, Layer
 
-from gazeloc_core.layer_colors import read_layer_colors
-from gazeloc_core.saved_views import MAX_VIEWS, SavedView, read_views, write_views
+from gazeloc_core.surfaces.layer_colors import read_layer_colors
+from gazeloc_core.surfaces.saved_views import MAX_VIEWS, SavedView, read_views, write_views
 
 DESK, DOOR = SavedView("desk", (1, 2, 3), (0, 0, 1)), SavedView("door", (3, 2, 1), (0, 0, 1))
 

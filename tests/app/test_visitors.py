@@ -21,10 +21,10 @@ from gazeloc_app.frames.looking import Target
 from gazeloc_app.palette import PEOPLE
 from gazeloc_app.panels.history import MAX_SHOWN, HistoryPanel
 from gazeloc_app.panels.people import PeopleBar
+from gazeloc_app.people.view_memory import MAX_BROWSERS, View, ViewMemory
+from gazeloc_app.people.visitors import Visitors
 from gazeloc_app.routes import Routes
 from gazeloc_app.state import AppState, Layer
-from gazeloc_app.view_memory import MAX_BROWSERS, View, ViewMemory
-from gazeloc_app.visitors import Visitors
 
 TAB, OTHER = "a" * 24, "b" * 24
 VIEW = View((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.9, "orbits")

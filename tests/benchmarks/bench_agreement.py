@@ -17,18 +17,18 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.stats import spearmanr
 
-from gazeloc_core.agreement import Agreement, FrameScorer
-from gazeloc_core.apparent_motion import TileEquations
 from gazeloc_core.arrays import Bytes, Floats
-from gazeloc_core.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.agreement import Agreement, FrameScorer
+from gazeloc_core.evaluation.apparent_motion import TileEquations
+from gazeloc_core.evaluation.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.scan_distortion import scan_distortion
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.experiments.workspace import Workspace
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
 from gazeloc_core.readers import open_recording, open_scan
-from gazeloc_core.scan_distortion import scan_distortion
 from gazeloc_core.stages import inputs
-from gazeloc_core.truth import read_tum
-from gazeloc_core.user_cache import user_cache
+from gazeloc_core.storage.user_cache import user_cache
 
 Row = tuple[str, str, bool]
 FRAMES = 48

@@ -20,16 +20,16 @@ from box_room import make_room, perturbed
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.state import AppState
 
-from gazeloc_core.alignment import Alignment, align, judge
+from gazeloc_core.alignment.alignment import Alignment, align, judge
+from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.refine import Refinement, refine
 from gazeloc_core.arrays import Floats
-from gazeloc_core.correspondences import Correspondences, gather
-from gazeloc_core.evaluate import match_times
+from gazeloc_core.evaluation.evaluate import match_times
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.refine import Refinement, refine
 from gazeloc_core.stages import registration
 from gazeloc_core.stages.case import Case
-from gazeloc_core.truth import read_tum
+from gazeloc_core.surfaces.raycast import Raycaster
 
 CM = 0.01
 
@@ -107,10 +107,10 @@ def _cm_deg(errors: Floats | tuple[float, float]) -> str:
 
 def scene(folder: Path) -> Case:
     """A scene of synthetic.py: its scan, recording, COLMAP model, and the truth of the recording's frames."""
-    from gazeloc_core.colmap_io import read_model
-    from gazeloc_core.colmap_join import join_to_recording
+    from gazeloc_core.frames.undistort import undistorted_camera
     from gazeloc_core.readers import open_recording, open_scan
-    from gazeloc_core.undistort import undistorted_camera
+    from gazeloc_core.sfm.colmap_io import read_model
+    from gazeloc_core.sfm.colmap_join import join_to_recording
 
     recording = open_recording(folder / "recording")
     model = read_model(folder / "colmap")

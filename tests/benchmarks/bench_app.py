@@ -27,7 +27,7 @@ from playwright.sync_api import Browser, sync_playwright
 from gazeloc_core import pipeline
 from gazeloc_core.arrays import Floats
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.surfaces.raycast import Raycaster
 
 Row = tuple[str, str, bool]
 STUDIO = SAMPLE_SCENES / "studio"

@@ -18,9 +18,9 @@ from gazeloc_app.state import AppState
 
 from gazeloc_core import pipeline
 from gazeloc_core.arrays import Floats, Ints
+from gazeloc_core.evaluation.protocol import make_protocol_project
 from gazeloc_core.keypoints import Sighting
 from gazeloc_core.project import Project
-from gazeloc_core.protocol import make_protocol_project
 from gazeloc_core.readers import depth_agreement, open_scan
 
 Row = tuple[str, str, bool]

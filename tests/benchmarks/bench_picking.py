@@ -32,8 +32,8 @@ from scipy.spatial.transform import Rotation
 from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.project import Project
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 
 Row = tuple[str, str, bool]
 TRIANGLES, CLICKS, AWAY_M = 500_000, 300, 3.0

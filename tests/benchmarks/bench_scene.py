@@ -12,18 +12,18 @@ from bench_alignment import scene as scene_case
 
 from gazeloc_core import pipeline
 from gazeloc_core.arrays import Floats
-from gazeloc_core.evaluate import evaluate
+from gazeloc_core.evaluation.evaluate import evaluate
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.gaze import cast_gaze
 from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import stage_named
 from gazeloc_core.project import Project
-from gazeloc_core.scene_project import scene_settings
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.poses import placed_models
 from gazeloc_core.stages.recording import load_keyframes
+from gazeloc_core.synthesis.scene_project import scene_settings
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.truth import read_tum
 
 Row = tuple[str, str, bool]
 BUDGET_S = 240.0

@@ -26,8 +26,8 @@ from playwright.sync_api import Browser, sync_playwright
 from size_project import FRAMES, POINTS, TRIANGLES, make_size_project
 
 from gazeloc_core.methods import Method
-from gazeloc_core.scan_display import ScanDisplay
 from gazeloc_core.stages.display import load_display, make_display
+from gazeloc_core.surfaces.scan_display import ScanDisplay
 
 Row = tuple[str, str, bool]
 SIZE = {"width": 1280, "height": 800}

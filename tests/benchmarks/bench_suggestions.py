@@ -18,11 +18,11 @@ from collections.abc import Callable
 import numpy as np
 from box_room import Room, make_room, perturbed, pose_errors_of
 
-from gazeloc_core.alignment import align
+from gazeloc_core.alignment.alignment import align
+from gazeloc_core.alignment.correspondences import Correspondences
+from gazeloc_core.alignment.next_keypoint import SuggestionOptions, suggest
 from gazeloc_core.arrays import Floats
-from gazeloc_core.correspondences import Correspondences
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.next_keypoint import SuggestionOptions, suggest
 from gazeloc_core.transforms import Similarity
 
 Row = tuple[str, str, bool]

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.arrays import Bools, Floats, Ints
-from gazeloc_core.protocol import held_out_frames, write_recording
+from gazeloc_core.evaluation.protocol import held_out_frames, write_recording
 from gazeloc_core.readers import open_recording, open_scan
-from gazeloc_core.sfm import reconstruct
+from gazeloc_core.sfm.reconstruction import reconstruct
 
 LEAST_IN_GLASSES, LEAST_IN_PHONE = 5, 3
 

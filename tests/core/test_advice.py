@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from app_project import LENS, SIZE_M, make_app_project
 
-from gazeloc_core import remembered_quality as memory
-from gazeloc_core.chart_file import read_charts
+from gazeloc_core.charts.chart_file import read_charts
 from gazeloc_core.errors import InputError
-from gazeloc_core.safe_range import SafeRangeOptions, tag_quality, try_tags
 from gazeloc_core.stages.advice import TITLES, draw_advice, floor_size_m
 from gazeloc_core.stages.inputs import load_scan
+from gazeloc_core.tag_quality import remembered as memory
+from gazeloc_core.tag_quality.safe_range import SafeRangeOptions, tag_quality, try_tags
 
 GRID = SafeRangeOptions(pixels=(30, 100), angles_deg=(0, 45), repeats=2)
 

@@ -6,13 +6,13 @@ import pytest
 from app_project import LENS, make_app_project, room_mesh, true_poses
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from gazeloc_core.agreement import LOW_SCORE, FrameScorer
 from gazeloc_core.errors import Cancelled
+from gazeloc_core.evaluation.agreement import LOW_SCORE, FrameScorer
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import SCORES, run_after_choice, run_stage
-from gazeloc_core.render import RayRenderer
 from gazeloc_core.stages import scores
 from gazeloc_core.stages.registration import align_keypoints
+from gazeloc_core.surfaces.render import RayRenderer
 
 POSE = true_poses()[5]
 

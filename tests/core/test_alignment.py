@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.alignment import Alignment, AlignmentMethod, AlignOptions, align, consensus, judge
-from gazeloc_core.correspondences import Correspondences, gather
+from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, AlignOptions, align, consensus, judge
+from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.evidence import reprojection_px
+from gazeloc_core.alignment.left_out import leave_one_out
+from gazeloc_core.alignment.similarity_fit import fit_similarity, residuals, solve_umeyama
 from gazeloc_core.errors import GeometryError, ProjectError
-from gazeloc_core.evidence import reprojection_px
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
-from gazeloc_core.left_out import leave_one_out
-from gazeloc_core.similarity_fit import fit_similarity, residuals, solve_umeyama
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 

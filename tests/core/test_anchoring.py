@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from gazeloc_core.anchored_bundle import AnchorOptions, Anchors, anchor
-from gazeloc_core.anchoring import AnchoringOptions, bend_to_tags
+from gazeloc_core.alignment.similarity_fit import fit_similarity
+from gazeloc_core.bending.anchored_bundle import AnchorOptions, Anchors, anchor
+from gazeloc_core.bending.anchoring import AnchoringOptions, bend_to_tags
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import Cancelled
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.similarity_fit import fit_similarity
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.transforms import Similarity
 

@@ -10,8 +10,8 @@ import pytest
 from bad_input import Act, Table, check_refused, into_folder, remove, write
 from tiny_captures import write_colmap
 
-from gazeloc_core.colmap_io import read_model
-from gazeloc_core.truth import read_tum
+from gazeloc_core.evaluation.truth import read_tum
+from gazeloc_core.sfm.colmap_io import read_model
 
 table = Table()
 colmap = table.damaged("colmap", lambda path: write_colmap(path, "text"), read_model)

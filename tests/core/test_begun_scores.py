@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gazeloc_core.agreement import UNKNOWN, Agreement
-from gazeloc_core.picture_tiles import TABLE_WIDTH, Tiles
+from gazeloc_core.evaluation.agreement import UNKNOWN, Agreement
+from gazeloc_core.evaluation.picture_tiles import TABLE_WIDTH, Tiles
 from gazeloc_core.stages.begun_scores import COLUMNS, BegunScores
 
 FOUND = Agreement(0.5, 0.4, 0.03, 0.006, 0.7, 0.3, 0.01)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazeloc_core.charts import Chart, HeatMap, Series, chart_from_json
+from gazeloc_core.charts.values import Chart, HeatMap, Series, chart_from_json
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.experiments.plates import draw
 

@@ -7,10 +7,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from tiny_captures import frame_times_ns, write_colmap, write_csv, write_image_folder, write_recording
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.colmap_io import find_model, join_to_recording, read_model, write_model
-from gazeloc_core.colmap_join import check_same_camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.readers import open_recording
+from gazeloc_core.sfm.colmap_io import find_model, join_to_recording, read_model, write_model
+from gazeloc_core.sfm.colmap_join import check_same_camera
 from gazeloc_core.sfm_model import SfmModel
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazeloc_core.color_scale import NO_VALUE, ColorScale
+from gazeloc_core.charts.color_scale import NO_VALUE, ColorScale
 
 
 def lightness(colors: np.ndarray) -> np.ndarray:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.evaluate import evaluate, match_times, pose_errors
+from gazeloc_core.evaluation.evaluate import evaluate, match_times, pose_errors
+from gazeloc_core.evaluation.trajectory_errors import ErrorSummary
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.trajectory_errors import ErrorSummary
 
 TIMES = 1_700_000_000_000_000_000 + 33_333_333 * np.arange(20)
 

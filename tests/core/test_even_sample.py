@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gazeloc_core.even_sample import even_sample
+from gazeloc_core.surfaces.even_sample import even_sample
 
 
 def crowded(count: int) -> np.ndarray:

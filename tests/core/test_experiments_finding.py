@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from gazeloc_core.charts import Chart, Series
+from gazeloc_core.charts.values import Chart, Series
 from gazeloc_core.experiments.finding import Finding, Provenance, inputs_of, write_finding, write_report
 
 ORIGIN = Provenance(commit="abc1234", version="0.1.0", size="small", inputs="in")

@@ -15,6 +15,7 @@ from evo.core.trajectory import PosePath3D
 from evo.tools import file_interface
 
 from gazeloc_core.errors import GeometryError, InputError
+from gazeloc_core.evaluation.truth import read_tum
 from gazeloc_core.export.colmap import write_colmap
 from gazeloc_core.export.gaze3d_csv import write_gaze3d_csv
 from gazeloc_core.export.nerfstudio import registered_frames, write_nerfstudio
@@ -23,7 +24,6 @@ from gazeloc_core.export.tum import TumOptions, write_tum
 from gazeloc_core.gaze import GazeInScan
 from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.trajectory import Trajectory
-from gazeloc_core.truth import read_tum
 
 TIMES = 1_700_000_000_123_456_789 + 33_333_333 * np.arange(6)
 STATUS = ["registered", "interpolated", "none", "rejected", "tag_only", "registered"]

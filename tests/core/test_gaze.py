@@ -7,11 +7,11 @@ import pytest
 from box_room import GLASSES, TAG_SIZE_M, camera_poses, room_mesh, true_tag_corners
 
 from gazeloc_core.errors import Cancelled, InputError
-from gazeloc_core.frames import ImageFrames
+from gazeloc_core.frames.sources import ImageFrames
 from gazeloc_core.gaze import GazeOptions, GazeStatus, cast_gaze
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.recording import Gaze, Recording
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.trajectory import Trajectory
 
 START_NS = 1_700_000_000_000_000_000

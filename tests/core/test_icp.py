@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from box_room import make_room, perturbed, pose_errors_of
 
-from gazeloc_core.alignment import AlignmentMethod, align, judge
-from gazeloc_core.correspondences import gather
+from gazeloc_core.alignment.alignment import AlignmentMethod, align, judge
+from gazeloc_core.alignment.correspondences import gather
+from gazeloc_core.alignment.icp import IcpOptions, Target, choose_points, run_icp
+from gazeloc_core.alignment.refine import RefineOptions, decide, refine
 from gazeloc_core.errors import Cancelled, GeometryError
-from gazeloc_core.icp import IcpOptions, Target, choose_points, run_icp
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.refine import RefineOptions, decide, refine
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.transforms import Similarity
 
 VARIANTS = [AlignmentMethod.ICP_POINT_TO_POINT, AlignmentMethod.ICP_POINT_TO_PLANE]

@@ -12,8 +12,8 @@ import pytest
 from data import CHECKOUT
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.files import folder_replaced_atomically, settle_folders, write_text_atomically
-from gazeloc_core.journal import Journal
+from gazeloc_core.storage.files import folder_replaced_atomically, settle_folders, write_text_atomically
+from gazeloc_core.storage.journal import Journal
 
 
 def test_lines_are_read_again_by_the_next_one(tmp_path):
@@ -68,7 +68,7 @@ def test_a_full_disk_leaves_the_lines_before_and_the_next_append_works(tmp_path,
 _WRITE_FOR_EVER = """
 import itertools, sys
 from pathlib import Path
-from gazeloc_core.journal import Journal
+from gazeloc_core.storage.journal import Journal
 journal = Journal(Path(sys.argv[1]))
 for i in itertools.count(len(journal.read())):
     journal.append([{"i": i, "long": "x" * 3000}])

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import Cancelled, InputError
-from gazeloc_core.keyframes import FrameMeasures, KeyframeOptions, choose_keyframes, measure_frames
 from gazeloc_core.recording import Recording
+from gazeloc_core.sfm.keyframes import FrameMeasures, KeyframeOptions, choose_keyframes, measure_frames
 
 SECOND = 1_000_000_000
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from box_room import Room, make_room, pose_errors_of
 
-from gazeloc_core.alignment import align
-from gazeloc_core.correspondences import Correspondences
+from gazeloc_core.alignment.alignment import align
+from gazeloc_core.alignment.correspondences import Correspondences
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.keypoint_count import KeypointCountOptions, exact_pairs, keypoint_count_errors
+from gazeloc_core.evaluation.keypoint_count import KeypointCountOptions, exact_pairs, keypoint_count_errors
 
 CM = 0.01
 

@@ -6,8 +6,8 @@ import json
 
 import pytest
 
+from gazeloc_core.clicks.keypoint_files import WRITERS, merged, read_keypoints
 from gazeloc_core.errors import InputError
-from gazeloc_core.keypoint_files import WRITERS, merged, read_keypoints
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
 
 PAIRS = KeypointSet(

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.keypoint_views import View, line_of_click
+from gazeloc_core.clicks.keypoint_views import View, line_of_click
 
 PINHOLE = Camera.pinhole(800, 600, 700, 710, 390, 310)
 FISHY = Camera("OPENCV", 800, 600, np.array([700, 700, 400, 300, -0.2, 0.05, 0.001, -0.001]))

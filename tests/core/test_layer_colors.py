@@ -3,7 +3,7 @@
 import pytest
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.layer_colors import read_layer_colors, write_layer_colors
+from gazeloc_core.surfaces.layer_colors import read_layer_colors, write_layer_colors
 
 COLORS = {"Scan": (1, 2, 3), "Ground truth": (0, 255, 9)}
 

@@ -8,10 +8,10 @@ import trimesh
 from data import SHARED, needs_shared
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.clouds import _registered, icp_point_to_point, sample_surface
 from gazeloc_core.errors import Cancelled, GeometryError, InputError
 from gazeloc_core.localize.global_ import GlobalOptions, align_global, register_global
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.clouds import _registered, icp_point_to_point, sample_surface
 from gazeloc_core.transforms import Similarity, rotation_angle_rad
 
 SFM_FROM_SCAN = Similarity(0.37, Rotation.from_rotvec([0.5, -1.1, 0.3]), np.array([1.0, -2.0, 0.5]))

@@ -8,20 +8,20 @@ from box_room import make_room, pose_errors_of
 from data import SAMPLE_SCENES
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.alignment import AlignmentMethod
-from gazeloc_core.colmap_io import read_model
-from gazeloc_core.colmap_join import join_to_recording
+from gazeloc_core.alignment.alignment import AlignmentMethod
+from gazeloc_core.alignment.paper_keypoints import TagCenters, scan_tag_centers, sfm_tag_centers
 from gazeloc_core.errors import Cancelled, GeometryError, InputError
-from gazeloc_core.evaluate import pose_errors
+from gazeloc_core.evaluation.evaluate import pose_errors
+from gazeloc_core.evaluation.truth import read_tum
+from gazeloc_core.frames.undistort import Undistorter
 from gazeloc_core.localize.sfm_paper import AlignPaperOptions, align_paper
-from gazeloc_core.paper_keypoints import TagCenters, scan_tag_centers, sfm_tag_centers
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.scan import Mesh
-from gazeloc_core.tags import TagOptions, detect_tags
+from gazeloc_core.sfm.colmap_io import read_model
+from gazeloc_core.sfm.colmap_join import join_to_recording
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.tags.detection import TagOptions, detect_tags
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.truth import read_tum
-from gazeloc_core.undistort import Undistorter
 
 POSITION_M, ROTATION_DEG = 0.005, 0.1
 """What sampling the scan at 100,000 points costs at most, without any other noise."""

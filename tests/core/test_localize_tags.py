@@ -9,7 +9,7 @@ from tag_walk import PINHOLE, START_NS, Walk, errors, pick, see, true_tag_corner
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.localize.tag_localization import TagLocalization
 from gazeloc_core.localize.tags import LocalizeTagsOptions, localize_tags
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
 
 EXACT = LocalizeTagsOptions(corner_error_px=0.02, place_error_m=1e-4)

@@ -16,11 +16,11 @@ from data import SHARED, needs_shared
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import HALF_PIXEL, Camera
-from gazeloc_core.evaluate import match_times, pose_errors
+from gazeloc_core.evaluation.evaluate import match_times, pose_errors
+from gazeloc_core.localize.resection import CameraPoses, SeenSquares, TagErrors, resect
 from gazeloc_core.localize.tags import LocalizeTagsOptions, localize_tags
-from gazeloc_core.resection import CameraPoses, SeenSquares, TagErrors, resect
-from gazeloc_core.tag_pose import normalised_corners
 from gazeloc_core.tag_types import TagCorners, TagSightings
+from gazeloc_core.tags.pose import normalised_corners
 
 FOLDER = SHARED / "tagslam_test9"
 SIDE_M = 0.15

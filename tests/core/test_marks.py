@@ -10,14 +10,14 @@ from app_project import make_app_project
 from evo.tools import file_interface
 
 from gazeloc_core.errors import InputError
+from gazeloc_core.evaluation.truth import read_tum
+from gazeloc_core.export.frame_notes import FrameNotes
 from gazeloc_core.export.poses_csv import write_poses_csv
-from gazeloc_core.frame_notes import FrameNotes
-from gazeloc_core.marks import MAX_NOTE, FrameMark, FrameMarks, Mark
+from gazeloc_core.frames.marks import MAX_NOTE, FrameMark, FrameMarks, Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import evaluate_recording, export, run_after_choice, score
 from gazeloc_core.stages.poses import fresh_trajectory
 from gazeloc_core.stages.registration import align_keypoints
-from gazeloc_core.truth import read_tum
 
 NOTE = 'door, half "open" <b>'
 

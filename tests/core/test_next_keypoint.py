@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gazeloc_core.correspondences import Correspondences
-from gazeloc_core.evidence import fit_covariance
-from gazeloc_core.next_keypoint import SuggestionOptions, suggest
-from gazeloc_core.similarity_fit import similarity_jacobian
+from gazeloc_core.alignment.correspondences import Correspondences
+from gazeloc_core.alignment.evidence import fit_covariance
+from gazeloc_core.alignment.next_keypoint import SuggestionOptions, suggest
+from gazeloc_core.alignment.similarity_fit import similarity_jacobian
 from gazeloc_core.transforms import Similarity
 
 HERE = Similarity.identity()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from box_room import make_room
 
-from gazeloc_core.correspondences import Correspondences
-from gazeloc_core.pair_effects import pair_effects
-from gazeloc_core.similarity_fit import fit_similarity
+from gazeloc_core.alignment.correspondences import Correspondences
+from gazeloc_core.alignment.pair_effects import pair_effects
+from gazeloc_core.alignment.similarity_fit import fit_similarity
 
 
 def noisy_pairs(room, count, seed=0, noise_m=0.02):

@@ -10,9 +10,7 @@ from box_room import GLASSES, PINHOLE, SFM_FROM_SCAN, TAGS, make_room, room_mesh
 from scipy.spatial.transform import RigidTransform, Rotation
 from sighted_room import looking_at
 
-from gazeloc_core.camera import Camera
-from gazeloc_core.errors import GeometryError, InputError
-from gazeloc_core.paper_keypoints import (
+from gazeloc_core.alignment.paper_keypoints import (
     SfmTagCenterOptions,
     TagCenters,
     center_pairs,
@@ -20,8 +18,10 @@ from gazeloc_core.paper_keypoints import (
     scene_size,
     sfm_tag_centers,
 )
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.camera import Camera
+from gazeloc_core.errors import GeometryError, InputError
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.transforms import Similarity
 

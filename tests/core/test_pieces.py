@@ -7,7 +7,7 @@ import pytest
 from box_room import PINHOLE, Room, make_room, true_tag_corners
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.pieces import Piece, place_pieces
+from gazeloc_core.bending.pieces import Piece, place_pieces
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.transforms import Similarity

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazeloc_core.artifacts import Artifact, State
 from gazeloc_core.errors import GazelocError, InputError, ProjectError, ProjectLockedError
-from gazeloc_core.files import folder_replaced_atomically
-from gazeloc_core.hashing import FileHasher, hash_of_value
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Sighting
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Chosen, Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.storage.artifacts import Artifact, State
+from gazeloc_core.storage.files import folder_replaced_atomically
+from gazeloc_core.storage.hashing import FileHasher, hash_of_value
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ def test_choices_of_alignments_are_kept(project: Project):
 
 def test_a_second_process_is_told_who_writes(project: Project):
     lock = str(project.folder / ".lock")
-    code = f"from gazeloc_core.lock import WriteLock; from pathlib import Path; WriteLock(Path({lock!r}))"
+    code = f"from gazeloc_core.storage.lock import WriteLock; from pathlib import Path; WriteLock(Path({lock!r}))"
     with project.lock():
         second = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
         assert second.returncode != 0
@@ -117,7 +117,7 @@ def test_a_second_process_is_told_who_writes(project: Project):
 
 def test_a_killed_writer_leaves_no_lock(project: Project):
     code = (
-        "import os; from gazeloc_core.lock import WriteLock; from pathlib import Path; "
+        "import os; from gazeloc_core.storage.lock import WriteLock; from pathlib import Path; "
         f"lock = WriteLock(Path({str(project.folder / '.lock')!r})); os._exit(9)"
     )
     subprocess.run([sys.executable, "-c", code])

@@ -15,9 +15,8 @@ from tiny_captures import picture, write_scan
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.evaluate import evaluate, pose_errors
-from gazeloc_core.project import Project, TagEntry
-from gazeloc_core.protocol import (
+from gazeloc_core.evaluation.evaluate import evaluate, pose_errors
+from gazeloc_core.evaluation.protocol import (
     ProtocolOptions,
     held_out_frames,
     make_protocol_project,
@@ -25,11 +24,12 @@ from gazeloc_core.protocol import (
     write_scan_without,
     write_truth,
 )
+from gazeloc_core.evaluation.truth import read_tum
+from gazeloc_core.project import Project, TagEntry
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.scan import RoomScan, ScanFrame
 from gazeloc_core.stages import inputs
 from gazeloc_core.trajectory import PoseStatus, Trajectory
-from gazeloc_core.truth import read_tum
 
 SIZE = (200, 150)
 

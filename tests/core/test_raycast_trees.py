@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.raycast import Raycaster
 
 
 @pytest.fixture(scope="module")

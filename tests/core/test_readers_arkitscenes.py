@@ -9,7 +9,7 @@ from app_project import MARKS, room_mesh, true_poses
 from tiny_arkitscenes import LOWRES, START_S, VIDEO, WIDE, matrix, write_arkitscenes
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.evaluate import pose_errors
+from gazeloc_core.evaluation.evaluate import pose_errors
 from gazeloc_core.readers import depth_agreement, open_scan
 
 FRAMES = 4

@@ -8,9 +8,9 @@ from PIL import Image
 from tiny_captures import BOX_FACES, CORNERS, ROOM_M, picture
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import open_scan
 from gazeloc_core.readers.obj_file import read_obj
+from gazeloc_core.surfaces.raycast import Raycaster
 
 
 def write_box(path, scale=1.0, **visual):

@@ -10,8 +10,8 @@ from data import SHARED, needs_shared
 from tiny_captures import ROOM_M, picture, write_scan
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import depth_agreement, open_scan
+from gazeloc_core.surfaces.raycast import Raycaster
 
 CHAIR = SHARED / "3dscannerapp_chair" / "chair_scan"
 

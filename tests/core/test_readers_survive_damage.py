@@ -9,9 +9,9 @@ import pytest
 from tiny_arkitscenes import write_arkitscenes
 from tiny_captures import write_colmap, write_image_folder, write_recording, write_scan
 
-from gazeloc_core.colmap_io import read_model
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.readers import open_recording, open_scan
+from gazeloc_core.sfm.colmap_io import read_model
 
 
 def use_scan(folder: Path) -> None:

@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.display_mesh import shaded
 from gazeloc_core.errors import RenderError
-from gazeloc_core.render import BACKGROUND, PyrenderRenderer, RayRenderer, Renderer, open_renderer
 from gazeloc_core.scan import Mesh, Texture
+from gazeloc_core.surfaces.display_mesh import shaded
+from gazeloc_core.surfaces.render import BACKGROUND, PyrenderRenderer, RayRenderer, Renderer, open_renderer
 
 CAMERA = Camera.pinhole(320, 240, 260.0, 262.0, 161.3, 118.2)
 LENS = Camera("FULL_OPENCV", 272, 270, np.array([190, 190, 136, 135, -0.13, 0.11, 0, 0, 0, 0.17, 0.05, 0.02]))
@@ -152,7 +152,7 @@ def test_without_egl_the_alternative_is_named(tmp_path):
     script.write_text(
         "import numpy as np\n"
         "from gazeloc_core.camera import Camera\n"
-        "from gazeloc_core.render import open_renderer\n"
+        "from gazeloc_core.surfaces.render import open_renderer\n"
         "from gazeloc_core.scan import Mesh\n"
         "from gazeloc_core.transforms import rigid_from_wxyz\n"
         "mesh = Mesh(np.array([[-9, -9, 2], [9, -9, 2], [0, 9, 2.0]]), [[0, 1, 2]], np.full((3, 3), 77, np.uint8))\n"

@@ -5,7 +5,15 @@ import pytest
 from box_room import PINHOLE, true_tag_corners
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.resection import CameraPoses, SeenSquares, TagErrors, distances_m, errors_px, pose_jacobian, resect
+from gazeloc_core.localize.resection import (
+    CameraPoses,
+    SeenSquares,
+    TagErrors,
+    distances_m,
+    errors_px,
+    pose_jacobian,
+    resect,
+)
 
 SQUARES = true_tag_corners().corners[[0, 2, 3, 5]]
 FOCAL = PINHOLE.focal_px

@@ -8,7 +8,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import Cancelled, InputError
-from gazeloc_core.safe_range import (
+from gazeloc_core.synthesis.one_tag import SightOptions, tag_sight
+from gazeloc_core.tag_quality.advice import RoomOptions, room_map, size_map
+from gazeloc_core.tag_quality.counts import TagCountOptions, tag_counts, true_views
+from gazeloc_core.tag_quality.safe_range import (
     SafeLimits,
     SafeRangeOptions,
     TagQuality,
@@ -19,13 +22,10 @@ from gazeloc_core.safe_range import (
     tag_quality,
     try_tags,
 )
-from gazeloc_core.synthesis.one_tag import SightOptions, tag_sight
-from gazeloc_core.tag_advice import RoomOptions, room_map, size_map
-from gazeloc_core.tag_bitmaps import tag_bitmap
-from gazeloc_core.tag_counts import TagCountOptions, tag_counts, true_views
-from gazeloc_core.tag_square import UNIT_SQUARE
 from gazeloc_core.tag_types import TagCorners, TagSightings
-from gazeloc_core.tags import TagDetector, TagOptions
+from gazeloc_core.tags.bitmaps import tag_bitmap
+from gazeloc_core.tags.detection import TagDetector, TagOptions
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 CAMERA = Camera.pinhole(1300, 1300, 766, 766, 650, 650)
 SIZE_M = 0.16

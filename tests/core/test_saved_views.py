@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.saved_views import SavedView, read_views, usual_views, write_views
 from gazeloc_core.scan import Mesh
-from gazeloc_core.viewpoint import FOV_RAD, up_vector
+from gazeloc_core.surfaces.saved_views import SavedView, read_views, usual_views, write_views
+from gazeloc_core.surfaces.viewpoint import FOV_RAD, up_vector
 
 CORNERS = np.array([[x, y, z] for x in (0, 6) for y in (0, 4) for z in (0, 2.5)], float)
 ROOM = Mesh(np.repeat(CORNERS, 50, axis=0), np.array([[0, 51, 101]]))

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.clicks.scan_clicks import ScanClickOptions, triangulate_on_scan
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.keypoints import Sighting
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
-from gazeloc_core.scan_clicks import ScanClickOptions, triangulate_on_scan
 
 PLACE = np.array([0.2, 0.1, 3.0])
 CLICK_PX, POSE_DEG = 1.5, 0.2

@@ -6,11 +6,11 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.glb import Glb, mesh_glb
 from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings
 from gazeloc_core.scan import Mesh, Texture
-from gazeloc_core.scan_display import glimpse, scan_display
 from gazeloc_core.stages.display import load_display, make_display
+from gazeloc_core.surfaces.glb import Glb, mesh_glb
+from gazeloc_core.surfaces.scan_display import glimpse, scan_display
 
 
 def ball(color) -> trimesh.Trimesh:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from gazeloc_core.apparent_motion import apparent_motion, tile_equations
 from gazeloc_core.camera import Camera
-from gazeloc_core.picture_tiles import Tiles
-from gazeloc_core.scan_distortion import DistortionOptions, scan_distortion
+from gazeloc_core.evaluation.apparent_motion import apparent_motion, tile_equations
+from gazeloc_core.evaluation.picture_tiles import Tiles
+from gazeloc_core.evaluation.scan_distortion import DistortionOptions, scan_distortion
 
 LENS = Camera.pinhole(320, 318, 225, 225, 160, 159)
 NO_ERROR = RigidTransform.identity()

@@ -12,8 +12,8 @@ from data import SHARED, needs_shared
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import Cancelled, InputError, ReconstructionError
 from gazeloc_core.readers import open_scan
-from gazeloc_core.sfm import SfmOptions, reconstruct
-from gazeloc_core.sfm_pairs import choose_pairs, frame_signatures, pairs_alike, pairs_near_in_time
+from gazeloc_core.sfm.pairs import choose_pairs, frame_signatures, pairs_alike, pairs_near_in_time
+from gazeloc_core.sfm.reconstruction import SfmOptions, reconstruct
 
 
 def test_pairs_near_in_time() -> None:

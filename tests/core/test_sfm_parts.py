@@ -8,10 +8,10 @@ import pycolmap
 from corner_room import CAMERA, write_room
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.sfm import SfmOptions, reconstruct
-from gazeloc_core.sfm_bridges import MoreFrames, frames_in_gaps, spaced
-from gazeloc_core.sfm_polish import polish
-from gazeloc_core.sfm_tags import corner_descriptors, corner_keypoints
+from gazeloc_core.sfm.bridges import MoreFrames, frames_in_gaps, spaced
+from gazeloc_core.sfm.polish import polish
+from gazeloc_core.sfm.reconstruction import SfmOptions, reconstruct
+from gazeloc_core.sfm.tags import corner_descriptors, corner_keypoints
 from gazeloc_core.tag_types import TagSightings
 
 NO_SIGHTINGS = TagSightings(np.empty(0), np.empty(0), np.empty((0, 4, 2)), np.empty(0))

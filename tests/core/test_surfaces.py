@@ -7,10 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sighted_room import sighted_room
 
-from gazeloc_core.clouds import sample_surface
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.surfaces import (
+from gazeloc_core.surfaces.clouds import sample_surface
+from gazeloc_core.surfaces.meshing import (
     DelaunayOptions,
     SurfacePointOptions,
     delaunay_surface,
@@ -18,6 +17,7 @@ from gazeloc_core.surfaces import (
     sighted_points,
     towards_cameras,
 )
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.transforms import Similarity
 
 BOTH = [poisson_surface, delaunay_surface]

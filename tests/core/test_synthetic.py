@@ -14,10 +14,10 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.experiments.hardness import blur_px, hardness, turn_deg_per_s
 from gazeloc_core.readers import open_recording, open_scan
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.synthesis import glasses, paths, tags, truth
-from gazeloc_core.synthesis.hardness import blur_px, hardness, turn_deg_per_s
 from gazeloc_core.synthesis.packing import packed
 from gazeloc_core.synthesis.room import X, Z, subpixels
 from gazeloc_core.synthesis.routes import ROUTES

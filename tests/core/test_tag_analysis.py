@@ -10,10 +10,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
-from gazeloc_core.tag_analysis import AnalysisOptions, analyse_solver, tag_place_errors, viewing_angles_deg
-from gazeloc_core.tag_pose import apriltag_poses, tag_poses
-from gazeloc_core.tag_square import UNIT_SQUARE
+from gazeloc_core.tag_quality.analysis import AnalysisOptions, analyse_solver, tag_place_errors, viewing_angles_deg
 from gazeloc_core.tag_types import TagCorners, TagSightings
+from gazeloc_core.tags.pose import apriltag_poses, tag_poses
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 SIZE_M = 0.16
 SQUARE = np.column_stack([UNIT_SQUARE, np.zeros(4)]) * SIZE_M

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.tag_bundle import TagBundleOptions as Options
-from gazeloc_core.tag_bundle import TagScene, _Problem, adjust_tags
-from gazeloc_core.tag_square import UNIT_SQUARE, fit_square
+from gazeloc_core.tags.bundle import TagBundleOptions as Options
+from gazeloc_core.tags.bundle import TagScene, _Problem, adjust_tags
+from gazeloc_core.tags.square import UNIT_SQUARE, fit_square
 
 CAMERA = Camera.pinhole(960, 720, 720, 720, 480, 360)
 SIZE_M = 0.16

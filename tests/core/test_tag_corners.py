@@ -8,12 +8,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
 from gazeloc_core.sfm_model import SfmModel
-from gazeloc_core.tag_corners import map_scan_corners, triangulate_sfm_corners
-from gazeloc_core.tag_square import UNIT_SQUARE, fit_plane, fit_square, inside_of_tag_px, tag_centre_px
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagSightings
+from gazeloc_core.tags.corners import map_scan_corners, triangulate_sfm_corners
+from gazeloc_core.tags.square import UNIT_SQUARE, fit_plane, fit_square, inside_of_tag_px, tag_centre_px
 
 CAMERA = Camera.pinhole(960, 720, 720, 720, 480, 360)
 SIZE_M = 0.16

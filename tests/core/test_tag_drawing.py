@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.tag_drawing import CUBE, FIRST_CORNER, OUTLINE, DrawingOptions, DrawnTag, draw_tags
-from gazeloc_core.tag_square import UNIT_SQUARE
+from gazeloc_core.tags.drawing import CUBE, FIRST_CORNER, OUTLINE, DrawingOptions, DrawnTag, draw_tags
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 PINHOLE = Camera.pinhole(320, 240, 300, 300, 160, 120)
 BENT = Camera("FULL_OPENCV", 320, 240, np.array([150, 150, 160, 120, 0.4, 0.2, 0, 0, 0, 0, 0, 0], float))

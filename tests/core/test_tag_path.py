@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gazeloc_core.localize.resection import CameraPoses
 from gazeloc_core.localize.tag_candidates import Candidates
 from gazeloc_core.localize.tag_path import PathOptions, are_tied, choose_path
 from gazeloc_core.localize.tag_path import _gaps as gaps
-from gazeloc_core.resection import CameraPoses
 
 OPTIONS = PathOptions(skip_cost=1.5, jump_cost=7.0)
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GeometryError, InputError
 from gazeloc_core.synthesis.tags import MODULES, PAPER_MODULES, tag_image
-from gazeloc_core.tag_pose import apriltag_poses, tag_poses
-from gazeloc_core.tag_square import UNIT_SQUARE
+from gazeloc_core.tags.pose import apriltag_poses, tag_poses
+from gazeloc_core.tags.square import UNIT_SQUARE
 
 CAMERA = Camera.pinhole(960, 720, 700, 705, 470, 365)
 DISTORTED = Camera("FULL_OPENCV", 1088, 1080, np.array([766, 766, 544, 541, -0.126, 0.1, 0, 0, 0.01, 0.21, 0.01, 0.02]))

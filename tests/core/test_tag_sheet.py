@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.tag_bitmaps import tag_bitmap
-from gazeloc_core.tag_sheet import PAPERS_M, SheetOptions, parse_ids, sheet_pdf, size_note
-from gazeloc_core.tags import FAMILIES, TagDetector, TagOptions
+from gazeloc_core.tags.bitmaps import tag_bitmap
+from gazeloc_core.tags.detection import FAMILIES, TagDetector, TagOptions
+from gazeloc_core.tags.sheet import PAPERS_M, SheetOptions, parse_ids, sheet_pdf, size_note
 
 MM_PER_POINT = 25.4 / 72
 PX_PER_MM = 4.0

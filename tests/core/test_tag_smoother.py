@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tag_walk import PINHOLE, Walk, true_tag_corners, walk
 
+from gazeloc_core.localize.resection import CameraPoses, SeenSquares, TagErrors
 from gazeloc_core.localize.tag_smoother import SmootherOptions, TagChain, _Problem, _State, smooth
-from gazeloc_core.resection import CameraPoses, SeenSquares, TagErrors
-from gazeloc_core.tag_pose import normalised_corners
+from gazeloc_core.tags.pose import normalised_corners
 
 ERRORS = TagErrors(place_error_m=1e-6)
 TAGS = true_tag_corners()

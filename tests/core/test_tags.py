@@ -10,7 +10,7 @@ from data import SHARED, needs_shared
 from pyapriltags.apriltags import Detector, _image_u8_get_array, _ImageU8
 
 from gazeloc_core.errors import Cancelled, InputError
-from gazeloc_core.tags import FAMILIES, TagDetector, TagOptions, detect_tags, hamming_of, memory_note
+from gazeloc_core.tags.detection import FAMILIES, TagDetector, TagOptions, detect_tags, hamming_of, memory_note
 
 UPRIGHT = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])  # tag_types.py: lower left, lower right, upper right, upper left
 

@@ -8,7 +8,7 @@ from painted_room import LENS, SFM_FROM_ROOM, Pictures, head_poses, model_of, pi
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.errors import Cancelled
-from gazeloc_core.frame_pose import FramePose
+from gazeloc_core.localize.frame_pose import FramePose
 from gazeloc_core.localize.sfm import localize_sfm
 from gazeloc_core.localize.stretches import stretches
 from gazeloc_core.localize.track_evidence import EvidenceOptions, KnownPose, Refusal, refusal

@@ -12,14 +12,14 @@ import pytest
 from data import SHARED, needs_shared
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_core.evaluate import pose_errors
+from gazeloc_core.evaluation.evaluate import pose_errors
+from gazeloc_core.evaluation.protocol import write_recording
 from gazeloc_core.localize.sfm import LocalizeSfmOptions, localize_sfm
 from gazeloc_core.localize.tracking import track_frames
-from gazeloc_core.protocol import write_recording
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.readers import open_recording, open_scan
 from gazeloc_core.recording import Recording
 from gazeloc_core.sfm_model import PlacedModel, SfmModel
+from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.transforms import Similarity
 
 CORNERS = 500

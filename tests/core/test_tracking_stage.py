@@ -8,7 +8,6 @@ from app_project import make_app_project
 from painted_room import Pictures, head_poses, model_of, recording_of
 
 from gazeloc_core import pipeline
-from gazeloc_core.artifacts import State
 from gazeloc_core.errors import Cancelled, ProjectError
 from gazeloc_core.localize.tracking import TrackingOptions, track_frames
 from gazeloc_core.methods import Method
@@ -16,6 +15,7 @@ from gazeloc_core.pipeline import stage_named
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs, tracking
 from gazeloc_core.stages.poses import fresh_trajectory, placed_models
+from gazeloc_core.storage.artifacts import State
 
 NAME = "walk"
 COUNT = 25

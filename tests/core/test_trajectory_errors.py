@@ -14,10 +14,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.errors import GeometryError
-from gazeloc_core.evaluate import Evaluation, evaluate
-from gazeloc_core.export.tum import write_tum
-from gazeloc_core.trajectory import PoseStatus, Trajectory
-from gazeloc_core.trajectory_errors import (
+from gazeloc_core.evaluation.evaluate import Evaluation, evaluate
+from gazeloc_core.evaluation.trajectory_errors import (
     AbsoluteError,
     ErrorSummary,
     Outliers,
@@ -28,8 +26,10 @@ from gazeloc_core.trajectory_errors import (
     percentile,
     relative_pose_errors,
 )
+from gazeloc_core.evaluation.truth import read_tum
+from gazeloc_core.export.tum import write_tum
+from gazeloc_core.trajectory import PoseStatus, Trajectory
 from gazeloc_core.transforms import Similarity, wxyz_of
-from gazeloc_core.truth import read_tum
 
 COUNT, SPACING_NS = 60, 100_000_000
 TIMES = 1_700_000_000_000_000_000 + SPACING_NS * np.arange(COUNT)

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gazeloc_core.truth import read_tum
+from gazeloc_core.evaluation.truth import read_tum
 
 
 def test_times_keep_every_nanosecond_and_quaternions_are_xyzw(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
-from gazeloc_core.undistort import (
+from gazeloc_core.frames.undistort import (
     Coverage,
     Undistorter,
     UndistortOptions,

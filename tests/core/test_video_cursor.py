@@ -5,8 +5,8 @@ import pytest
 from tiny_captures import frame_times_ns, write_video
 
 from gazeloc_core.errors import InputError
-from gazeloc_core.frames import VideoFrames
-from gazeloc_core.video_cursor import VideoCursor, cursor_of
+from gazeloc_core.frames.sources import VideoFrames
+from gazeloc_core.frames.video_cursor import VideoCursor, cursor_of
 
 
 @pytest.fixture

@@ -3,8 +3,8 @@
 import numpy as np
 from app_project import WALLS, room_mesh, true_poses
 
+from gazeloc_core.charts.palette import colors_of_ids
 from gazeloc_core.experiments.overview import look_at, look_into, with_cameras, with_points
-from gazeloc_core.palette import colors_of_ids
 from gazeloc_core.scan import RoomScan
 
 

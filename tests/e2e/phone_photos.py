@@ -11,9 +11,9 @@ import numpy as np
 from app_project import room_mesh, true_poses
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
-from gazeloc_core.render import RayRenderer
 from gazeloc_core.scan import ScanFrame
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.render import RayRenderer
 
 PHONE = Camera.pinhole(480, 360, 400.0, 400.0, 240.0, 180.0)
 

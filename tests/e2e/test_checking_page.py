@@ -9,7 +9,7 @@ from e2e.app_page import AppPage
 from gazeloc_app.actions.views import CompareWith, ShowFrame
 from gazeloc_app.app import App
 
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.pipeline import run_after_choice
 from gazeloc_core.project import Chosen

@@ -20,13 +20,13 @@ from gazeloc_app.server import make_server
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
-from gazeloc_core.glb import mesh_glb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
-from gazeloc_core.raycast import Raycaster
 from gazeloc_core.scan import Mesh
+from gazeloc_core.surfaces.glb import mesh_glb
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.viewpoint import facing
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import facing
 
 pytestmark = pytest.mark.e2e
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gazeloc_app.state import AppState, Level
-from gazeloc_core.keypoint_files import merged
+from gazeloc_core.clicks.keypoint_files import merged
 from gazeloc_core.keypoints import KeypointSet
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gazeloc_app.state import AppState
-from gazeloc_core.marks import FrameMark, FrameMarks, Mark
+from gazeloc_core.frames.marks import FrameMark, FrameMarks, Mark
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gazeloc_app.state import AppState, Level
-from gazeloc_core.saved_views import MAX_VIEWS, SavedView
+from gazeloc_core.surfaces.saved_views import MAX_VIEWS, SavedView
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from gazeloc_app.state import AppState, Coloring, Layer, Level
-from gazeloc_core.glb import Rgb
+from gazeloc_core.surfaces.glb import Rgb
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from typing import Any
 
 from gazeloc_app.state import Annotation, Layer
 from gazeloc_core.errors import InputError
-from gazeloc_core.glb import Rgb
+from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.layer_colors import checked_color
-from gazeloc_core.marks import FrameMarks
 from gazeloc_core.methods import Method
-from gazeloc_core.saved_views import views_from_json, views_to_json
+from gazeloc_core.surfaces.glb import Rgb
+from gazeloc_core.surfaces.layer_colors import checked_color
+from gazeloc_core.surfaces.saved_views import views_from_json, views_to_json
 
 
 def tints_to_json(tints: tuple[tuple[Layer, Rgb], ...]) -> dict[str, list[int]]:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from gazeloc_app.state import Annotation, AppState, Layer
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.layer_colors import read_layer_colors, write_layer_colors
-from gazeloc_core.saved_views import read_views, write_views
+from gazeloc_core.surfaces.layer_colors import read_layer_colors, write_layer_colors
+from gazeloc_core.surfaces.saved_views import read_views, write_views
 
 _log = logging.getLogger(__name__)
 

@@ -19,8 +19,8 @@ from pathlib import Path
 from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
 from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.journal import Journal
 from gazeloc_core.project import Chosen, Project
+from gazeloc_core.storage.journal import Journal
 
 MAX_LINES = 4 * MAX_UNDO
 """A journal that is longer is written anew, with the steps alone that can still be reached."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 
 from gazeloc_app.state import Annotation, Layer
+from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
-from gazeloc_core.marks import FrameMarks
-from gazeloc_core.saved_views import SavedView
+from gazeloc_core.surfaces.saved_views import SavedView
 
 
 def describe(before: Annotation, after: Annotation) -> str:

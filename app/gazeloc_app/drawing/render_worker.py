@@ -16,18 +16,18 @@ import numpy as np
 
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.display_mesh import shaded
 from gazeloc_core.errors import GazelocError, InputError, RenderError
-from gazeloc_core.frames import FrameSource
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.frames.sources import FrameSource
+from gazeloc_core.frames.undistort import Undistorter
+from gazeloc_core.frames.video_cursor import VideoCursor, cursor_of
 from gazeloc_core.recording import Recording
-from gazeloc_core.render import RayRenderer, Rendered, Renderer, open_renderer
 from gazeloc_core.scan import Mesh, read_image
-from gazeloc_core.tag_drawing import draw_tags, drawn_tags
+from gazeloc_core.surfaces.display_mesh import shaded
+from gazeloc_core.surfaces.raycast import Raycaster
+from gazeloc_core.surfaces.render import RayRenderer, Rendered, Renderer, open_renderer
 from gazeloc_core.tag_types import TagSightings
+from gazeloc_core.tags.drawing import draw_tags, drawn_tags
 from gazeloc_core.transforms import rigid_from_wxyz
-from gazeloc_core.undistort import Undistorter
-from gazeloc_core.video_cursor import VideoCursor, cursor_of
 
 JPEG_QUALITY = 90
 _log = logging.getLogger(__name__)

@@ -19,8 +19,8 @@ from gazeloc_app.drawing.render_worker import MakeDisplay
 from gazeloc_app.state import Level
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.scan import Mesh
-from gazeloc_core.scan_display import ScanDisplay, scan_display
 from gazeloc_core.stages.display import load_display, scanned_from
+from gazeloc_core.surfaces.scan_display import ScanDisplay, scan_display
 
 SMALL = 100_000
 """Faces of a mesh that is packed in a tenth of a second, so that keeping it would win nothing."""

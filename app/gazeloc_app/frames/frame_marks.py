@@ -16,7 +16,7 @@ from gazeloc_app.frames.sightings import frame_pose
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats
-from gazeloc_core.keypoint_views import View, line_of_click
+from gazeloc_core.clicks.keypoint_views import View, line_of_click
 from gazeloc_core.keypoints import KeypointPair
 from gazeloc_core.transforms import Similarity
 

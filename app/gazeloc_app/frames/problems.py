@@ -8,9 +8,9 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Bools, Floats
-from gazeloc_core.marks import FrameMarks, Mark
+from gazeloc_core.evaluation.agreement import LOW_SCORE
+from gazeloc_core.frames.marks import FrameMarks, Mark
 from gazeloc_core.trajectory import Trajectory
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from gazeloc_app.terminal import progress_bar, table
 from gazeloc_core import pipeline
-from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.errors import InputError
-from gazeloc_core.marks import FrameMarks
+from gazeloc_core.evaluation.agreement import LOW_SCORE
+from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.methods import Method, method_named
 from gazeloc_core.progress import part
 from gazeloc_core.project import Project

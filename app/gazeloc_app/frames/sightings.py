@@ -9,9 +9,9 @@ from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import AppState
+from gazeloc_core.clicks.scan_clicks import triangulate_on_scan
 from gazeloc_core.errors import GeometryError
 from gazeloc_core.keypoints import Point, Sighting
-from gazeloc_core.scan_clicks import triangulate_on_scan
 from gazeloc_core.triangulation import TriangulatedPoint, triangulate_sightings
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal
-from gazeloc_core.agreement import LOW_SCORE
 from gazeloc_core.arrays import Floats, Ints
-from gazeloc_core.marks import FrameMarks, Mark
+from gazeloc_core.evaluation.agreement import LOW_SCORE
+from gazeloc_core.frames.marks import FrameMarks, Mark
 from gazeloc_core.trajectory import PoseStatus, Trajectory
 
 PARTS = 400

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gazeloc_core.clicks.keypoint_cells import SideName
+from gazeloc_core.clicks.keypoint_files import WRITERS, merged, read_keypoints
 from gazeloc_core.errors import InputError, ProjectError
-from gazeloc_core.files import write_text_atomically
-from gazeloc_core.keypoint_cells import SideName
-from gazeloc_core.keypoint_files import WRITERS, merged, read_keypoints
 from gazeloc_core.project import Project
-from gazeloc_core.user_files import read_bytes
+from gazeloc_core.storage.files import write_text_atomically
+from gazeloc_core.storage.user_files import read_bytes
 
 
 def import_keypoints(folder: Path, file: Path, *, recording: str | None, side: SideName) -> None:

@@ -16,8 +16,8 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.live import FitFound
 from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState
-from gazeloc_core.alignment import AlignmentMethod, align
-from gazeloc_core.correspondences import gather
+from gazeloc_core.alignment.alignment import AlignmentMethod, align
+from gazeloc_core.alignment.correspondences import gather
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
 from gazeloc_core.stages.registration import align_options, save_alignment

@@ -23,8 +23,8 @@ from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import Point
+from gazeloc_core.surfaces.viewpoint import up_vector
 from gazeloc_core.transforms import wxyz_of
-from gazeloc_core.viewpoint import up_vector
 
 SIZE_PX = 320
 ACROSS_M = 0.25

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform
 
-from gazeloc_app.kept import EVERYTHING, Kept
+from gazeloc_app.scene.kept import EVERYTHING, Kept
 from gazeloc_core.arrays import Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.raycast import Raycaster
+from gazeloc_core.surfaces.raycast import Raycaster
 
 CLICK_RADIUS_PX = 8.0
 _SAME_CLICK_S = 0.15

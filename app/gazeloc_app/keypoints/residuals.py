@@ -8,12 +8,12 @@ import numpy as np
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.state import AppState
-from gazeloc_core.alignment import Alignment
+from gazeloc_core.alignment.alignment import Alignment
+from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.evidence import reprojection_px
+from gazeloc_core.alignment.pair_effects import PairEffects, pair_effects
 from gazeloc_core.arrays import Floats
-from gazeloc_core.correspondences import Correspondences, gather
-from gazeloc_core.evidence import reprojection_px
 from gazeloc_core.keypoints import KeypointSet
-from gazeloc_core.pair_effects import PairEffects, pair_effects
 from gazeloc_core.sfm_model import SfmModel
 
 

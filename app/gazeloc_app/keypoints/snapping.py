@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gazeloc_app.kept import EVERYTHING, Kept
 from gazeloc_app.keypoints.picking import angles_to_ray
+from gazeloc_app.scene.kept import EVERYTHING, Kept
 from gazeloc_core.arrays import Floats
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity

@@ -13,15 +13,15 @@ import numpy as np
 from gazeloc_app.data import ProjectData
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.state import AppState
-from gazeloc_core.alignment import consensus
+from gazeloc_core.alignment.alignment import consensus
+from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.next_keypoint import Suggestion, suggest
 from gazeloc_core.arrays import Floats, Ints
-from gazeloc_core.correspondences import Correspondences, gather
-from gazeloc_core.even_sample import even_sample
 from gazeloc_core.keypoints import Point
-from gazeloc_core.next_keypoint import Suggestion, suggest
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.surfaces.even_sample import even_sample
+from gazeloc_core.surfaces.viewpoint import up_vector
 from gazeloc_core.transforms import Similarity
-from gazeloc_core.viewpoint import up_vector
 
 CANDIDATES = 500
 ON_SCAN_M = 0.04

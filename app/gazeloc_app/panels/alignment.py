@@ -16,7 +16,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.keypoints.live_alignment import is_following
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.work import tasks
-from gazeloc_core.alignment import Alignment, AlignmentMethod
+from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod
 
 NONE = "(none)"
 NEWEST_FITS = 6

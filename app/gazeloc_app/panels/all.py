@@ -37,8 +37,8 @@ from gazeloc_app.state import AppState
 from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
-from gazeloc_core.saved_views import SavedView, usual_views
-from gazeloc_core.viewpoint import up_vector
+from gazeloc_core.surfaces.saved_views import SavedView, usual_views
+from gazeloc_core.surfaces.viewpoint import up_vector
 
 MAIN_WIDTH_PX, SIDE_WIDTH_PX = 400, 430
 

@@ -10,9 +10,9 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import MAX_THINNING, ColorCameras, ThinCameras
 from gazeloc_app.palette import STATUSES, Rgb, hexadecimal
-from gazeloc_app.scene_cameras import SceneCameras
+from gazeloc_app.scene.cameras import SceneCameras
 from gazeloc_app.state import AppState, Coloring
-from gazeloc_core.color_scale import NO_VALUE, ColorScale
+from gazeloc_core.charts.color_scale import NO_VALUE, ColorScale
 
 _NONE = {
     Coloring.ERROR: "No frame has a ground truth to be measured against.",

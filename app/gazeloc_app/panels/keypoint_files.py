@@ -12,9 +12,9 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.files import ImportKeypoints
 from gazeloc_app.state import AppState, Level
+from gazeloc_core.clicks.keypoint_cells import SideName
+from gazeloc_core.clicks.keypoint_files import WRITERS, read_keypoints
 from gazeloc_core.errors import InputError
-from gazeloc_core.keypoint_cells import SideName
-from gazeloc_core.keypoint_files import WRITERS, read_keypoints
 
 SIDES: dict[str, SideName] = {"the scan": "scan", "the reconstruction": "sfm"}
 FORMATS = {

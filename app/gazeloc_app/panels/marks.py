@@ -13,7 +13,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.state import AppState
-from gazeloc_core.marks import Mark
+from gazeloc_core.frames.marks import Mark
 
 _KEYS: dict[Mark, Any] = {Mark.GOOD: "G", Mark.BAD: "B", Mark.UNSURE: "U"}
 _LABELS = {f"{MARK_SIGNS[mark]} {mark.value.capitalize()} ({_KEYS[mark]})": mark for mark in Mark}

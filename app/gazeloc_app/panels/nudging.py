@@ -1,4 +1,4 @@
-"""The arrow keys of one browser as commands: they nudge the selected keypoint (see hand.py for what of it).
+"""The arrow keys of one browser as commands: they nudge the selected keypoint (see keypoints/hand.py for what of it).
 
 The page takes the keys itself while a keypoint is selected (static/page/arrows.js), else viser would turn the view with
 them; the commands are in the palette and name the keys in the help.
@@ -12,7 +12,7 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.moving import ARROWS, Nudge, nudge_of
+from gazeloc_app.keypoints.moving import ARROWS, Nudge, nudge_of
 
 NAMES = {"arrowleft": "left", "arrowright": "right", "arrowup": "up", "arrowdown": "down"}
 LENGTHS = {False: "2 mm, in frames by a pixel", True: "1 cm, in frames by a tenth of a pixel"}

@@ -19,8 +19,8 @@ from gazeloc_app.frames.timeline_html import MARK_SIGNS
 from gazeloc_app.panels.playing import table_of
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
-from gazeloc_core.evaluate import errors_by_mark
-from gazeloc_core.marks import FrameMarks, Mark
+from gazeloc_core.evaluation.evaluate import errors_by_mark
+from gazeloc_core.frames.marks import FrameMarks, Mark
 from gazeloc_core.stages.scores import FrameScores
 
 _MOST = 40

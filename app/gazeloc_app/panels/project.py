@@ -14,9 +14,9 @@ from gazeloc_app.newest import Newest
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
 from gazeloc_core import pipeline
-from gazeloc_core.artifacts import State
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
+from gazeloc_core.storage.artifacts import State
 
 _COLORS = {
     State.FRESH: widgets.GOOD,

@@ -14,7 +14,7 @@ from gazeloc_app.actions.places import RemoveView, RenameView, SaveView
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.arrays import Floats
 from gazeloc_core.errors import InputError
-from gazeloc_core.saved_views import MAX_NAME, SavedView
+from gazeloc_core.surfaces.saved_views import MAX_NAME, SavedView
 
 _GO, _RENAME, _REMOVE = "Go", "Rename", "Remove"
 

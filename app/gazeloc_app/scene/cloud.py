@@ -8,8 +8,8 @@ import viser
 from gazeloc_app.palette import POINTS
 from gazeloc_app.scene.placing import place
 from gazeloc_core.arrays import Bytes, Floats, Ints
-from gazeloc_core.even_sample import even_sample
-from gazeloc_core.glb import Rgb
+from gazeloc_core.surfaces.even_sample import even_sample
+from gazeloc_core.surfaces.glb import Rgb
 from gazeloc_core.transforms import Similarity
 
 MAX_POINTS = 200_000

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from gazeloc_core.arrays import Bytes, Floats
-from gazeloc_core.glb import lines_glb
+from gazeloc_core.surfaces.glb import lines_glb
 
 
 class ErrorsLayer:

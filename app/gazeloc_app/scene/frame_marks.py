@@ -12,7 +12,7 @@ from gazeloc_app.frames.frame_marks import Line, Mark
 from gazeloc_app.palette import SCAN_SIDE, SELECTED, SFM_SIDE
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_core.arrays import Floats
-from gazeloc_core.keypoint_views import View
+from gazeloc_core.clicks.keypoint_views import View
 
 CLICKED, EXPECTED = SCAN_SIDE, SFM_SIDE
 _BEFORE_PICTURE = 0.995

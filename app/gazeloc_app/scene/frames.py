@@ -12,7 +12,7 @@ from gazeloc_app.palette import SHOWN_FRAME
 from gazeloc_app.scene.placing import pose_arguments
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.glb import Rgb
+from gazeloc_core.surfaces.glb import Rgb
 
 PLANE_M = 0.5
 """Distance from the camera at which its picture stands in the scene."""

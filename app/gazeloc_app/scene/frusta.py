@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_core.arrays import Bytes, Floats, Ints
 from gazeloc_core.camera import Camera
-from gazeloc_core.glb import Rgb, wires_glb
+from gazeloc_core.surfaces.glb import Rgb, wires_glb
 
 EDGES: Ints = np.array([[0, 1], [0, 2], [0, 3], [0, 4], [1, 2], [2, 3], [3, 4], [4, 1], [1, 5], [5, 2]], dtype=np.int64)
 """The lines between a pyramid's points: four edges, the picture's frame, and a roof that marks its top."""

@@ -7,8 +7,8 @@ import viser
 
 from gazeloc_app.palette import AXES, GROUND
 from gazeloc_core.arrays import Bytes, Floats
-from gazeloc_core.glb import lines_glb
-from gazeloc_core.viewpoint import up_vector
+from gazeloc_core.surfaces.glb import lines_glb
+from gazeloc_core.surfaces.viewpoint import up_vector
 
 """Of x, y and z; colour-blind eyes tell them apart."""
 _ABOVE_FLOOR_M = 0.005

@@ -12,8 +12,8 @@ import viser
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.palette import DISABLED, RESIDUAL, SCAN_SIDE, SELECTED, SFM_SIDE
 from gazeloc_app.scene.placing import NodeGroup
-from gazeloc_core.glb import Rgb
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Point
+from gazeloc_core.surfaces.glb import Rgb
 from gazeloc_core.transforms import Similarity
 
 

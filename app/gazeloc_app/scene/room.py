@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import viser
 
-from gazeloc_core.glb import WHITE, Glb, Rgb
+from gazeloc_core.surfaces.glb import WHITE, Glb, Rgb
 
 
 class RoomLayer:
-    """The scan at `/scan`, as `gazeloc_core.scan_display` makes it.
+    """The scan at `/scan`, as `gazeloc_core.surfaces.scan_display` makes it.
 
     Never attach a click handler to its node: that costs the browser 136 ms per mouse move at 1.5 million triangles.
     """

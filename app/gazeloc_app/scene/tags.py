@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from gazeloc_app.scene.placing import NodeGroup, place
-from gazeloc_core.glb import Rgb, lines_glb
+from gazeloc_core.surfaces.glb import Rgb, lines_glb
 from gazeloc_core.tag_types import TagCorners
 from gazeloc_core.transforms import Similarity
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from gazeloc_core.scan import Mesh
-from gazeloc_core.viewpoint import FOV_RAD, overview, up_vector
+from gazeloc_core.surfaces.viewpoint import FOV_RAD, overview, up_vector
 
 
 def set_start(server: viser.ViserServer, mesh: Mesh, up_axis: str) -> None:

@@ -7,7 +7,7 @@ from gazeloc_app.scene.tape import TapeLayer, length_text
 from gazeloc_app.state import Level
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.keypoints import Point
-from gazeloc_core.viewpoint import up_vector
+from gazeloc_core.surfaces.viewpoint import up_vector
 
 
 class TapeTool(Tool):

@@ -16,11 +16,11 @@ import viser
 from numpy.typing import ArrayLike
 
 from gazeloc_app.actions.action import Action
-from gazeloc_app.cut import Cut
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.looking import Looking
 from gazeloc_app.keypoints import picking
 from gazeloc_app.keypoints.snapping import NEAR_PX, Snapped, snap
+from gazeloc_app.scene.cut import Cut
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats, frozen
 from gazeloc_core.camera import Camera

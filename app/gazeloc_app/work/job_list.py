@@ -17,9 +17,9 @@ from gazeloc_app.state import AppState, Job
 from gazeloc_app.work import tasks
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.files import read_json, write_json_atomically
 from gazeloc_core.methods import Method
 from gazeloc_core.project import Project
+from gazeloc_core.storage.files import read_json, write_json_atomically
 
 VERSION = 1
 _BEGUN_BY_ITSELF = (tasks.color_scan,)

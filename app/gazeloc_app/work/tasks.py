@@ -9,12 +9,12 @@ import numpy as np
 from gazeloc_app.state import Level
 from gazeloc_app.work.jobs import Outcome
 from gazeloc_core import pipeline
-from gazeloc_core.chart_file import read_charts
+from gazeloc_core.charts.chart_file import read_charts
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part
 from gazeloc_core.project import Project
 from gazeloc_core.stages import advice, figures, registration
-from gazeloc_core.user_cache import user_cache
+from gazeloc_core.storage.user_cache import user_cache
 
 _LEVELS = {"good": Level.INFO, "warning": Level.WARNING, "bad": Level.ERROR}
 

@@ -1,0 +1,1 @@
+"""Charts as values, their colours and their files."""

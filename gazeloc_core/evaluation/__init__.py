@@ -1,0 +1,1 @@
+"""Errors against a truth, agreement of frame and render, the paper's protocol."""

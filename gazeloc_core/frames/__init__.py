@@ -1,0 +1,1 @@
+"""A recording's pictures: read, undistorted, marked by people."""

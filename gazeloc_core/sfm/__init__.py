@@ -1,0 +1,1 @@
+"""Structure from motion on the keyframes, and COLMAP's files."""

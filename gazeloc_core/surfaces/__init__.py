@@ -1,0 +1,1 @@
+"""The scan's surface: rays, renders, points, what the screen shows of it."""

@@ -1,0 +1,1 @@
+"""AprilTags: found in pictures, measured on the scan, drawn and printed."""
