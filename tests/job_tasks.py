@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gazeloc_app.state import Level
 from gazeloc_app.work import tasks
-from gazeloc_app.work.jobs import Outcome
+from gazeloc_app.work.outcome import Outcome
 
 from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report

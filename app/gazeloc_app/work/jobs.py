@@ -15,7 +15,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from pathlib import Path
@@ -25,26 +24,13 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import JobEnded, JobProgressed
 from gazeloc_app.state import Level
 from gazeloc_app.work.job_log import JobLog
+from gazeloc_app.work.outcome import Task
 from gazeloc_app.work.remaining import Remaining
 from gazeloc_core.errors import Cancelled, GazelocError
 from gazeloc_core.progress import Report
 
 PATIENCE_S = 5.0
 _REPORT_INTERVAL_S = 0.1
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a task tells the app at its end: a sentence, and the alignment it suggests to put in force."""
-
-    text: str
-    level: Level = Level.INFO
-    alignment: str | None = None
-    by_person: bool = False
-
-
-Task = Callable[..., Outcome]
-"""`task(folder, report, **keywords)`, importable by name in the worker."""
 
 
 class JobRunner:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_app.state import Level
-from gazeloc_app.work.jobs import Outcome
+from gazeloc_app.work.outcome import Outcome
 from gazeloc_core import pipeline
 from gazeloc_core.charts.chart_file import read_charts
 from gazeloc_core.methods import Method
