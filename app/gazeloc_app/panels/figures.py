@@ -14,7 +14,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
-from gazeloc_app.work.jobs import Task
+from gazeloc_app.work.outcome import Task
 
 NONE = "(not drawn yet)"
 NONE_YET = widgets.card(
