@@ -105,6 +105,19 @@ def test_a_camera_without_a_picture_or_in_a_hidden_layer_is_not_looked_through(p
     assert page.jobs == []
 
 
+def test_a_click_on_an_estimate_goes_to_its_frame_unless_its_layer_is_hidden(page):
+    trajectory = MagicMock(localised_keyframes=np.array([4, 7]))
+    trajectory.poses.return_value = RigidTransform.from_translation([[3.0, 0, 0], [3.0, 0, 2.0]])
+    page.data.trajectory.return_value = trajectory
+    take(page, CameraTool)
+    click(page, np.array([3.0, 0, 2.05]) - EYE)
+    assert page.state.frame == 7
+    page.state = ShowLayer(Layer.ESTIMATE, False).apply(page.state)
+    take(page, CameraTool)
+    click(page, np.array([3.0, 0, 0.05]) - EYE)
+    assert page.state.frame == 7
+
+
 def test_one_spot_clicked_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page, scan):
     for frame in (0, 1):
         look(page, scan, frame)

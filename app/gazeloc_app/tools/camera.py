@@ -22,9 +22,11 @@ class CameraTool(Tool):
     aims = False
 
     def click(self, click: Click) -> Action | None:
-        """The camera under the click, drawn or not thinned out."""
+        """The camera under the click, also one that was thinned out; of a layer that is hidden none is meant."""
         bench, state = self.bench, self.bench.state()
-        trajectory = bench.data.trajectory(state.recording, bench.data.poses_key(state.recording, state.annotation))
+        trajectory = None
+        if state.layers.is_visible(Layer.ESTIMATE):
+            trajectory = bench.data.trajectory(state.recording, bench.data.poses_key(state.recording, state.annotation))
         frames = np.zeros(0, np.int64) if trajectory is None else trajectory.localised_keyframes
         photos = bench.data.scan().frames_with_images if state.layers.is_visible(Layer.PHONE) else ()
         poses = [photo.scan_from_camera for photo in photos]
