@@ -10,6 +10,7 @@ import json
 import os
 import socket
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
@@ -38,6 +39,10 @@ else:
         fcntl.flock(file.fileno(), fcntl.LOCK_EX)
 
 
+PATIENCE_S = 0.5
+"""For how long a project is asked for again before it counts as somebody else's."""
+
+
 @contextmanager
 def brief_lock(path: Path) -> Iterator[None]:
     """Keep others out while a file is read, changed and written: the app and its worker process both write settings."""
@@ -58,7 +63,7 @@ class WriteLock:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file: IO[str] | None = path.open("a+", encoding="utf-8")
         try:
-            _lock(self._file)
+            _lock_soon(self._file)
         except OSError as error:
             holder = _holder(self._file)
             self._file.close()
@@ -86,6 +91,19 @@ class WriteLock:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
+
+
+def _lock_soon(file: IO[str]) -> None:
+    """Lock, or raise OSError: a process that is being started right now holds its parent's open files for a moment."""
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            _lock(file)
+            return
+        except OSError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.02)
 
 
 def _holder(file: IO[str]) -> str:

@@ -35,6 +35,15 @@ _FLAGS = [
 ]
 _FAST_FLAGS = ["--use-angle=gl-egl"]
 """Mesa instead of SwiftShader draws twice as fast; set GAZELOC_BROWSER_GL=mesa where it is installed."""
+_DRAWN = """
+() => {
+  const drawn = window.__viserTestpoints?.rendererInfo;
+  if (!window.__viserMutable?.requestRender || !drawn) return null;
+  window.__viserMutable.requestRender();
+  return drawn.render.frame;
+}
+"""
+"""Asks for a frame; how many were drawn so far, null while the page is being loaded."""
 _WORLD_TO_CLIP = """
 () => {
   const m = window.__viserMutable;
@@ -91,7 +100,7 @@ class ViewerPage:
         self._dismiss("Software WebGL rendering detected")
         end = time.monotonic() + timeout_s
         view = None
-        while view != (view := self._view()):  # on a slow machine two frames may take a second
+        while view != (view := self._view_if_any()):  # on a slow machine two frames may take a second
             assert time.monotonic() < end, "the camera does not come to rest"
             self.settle()
             self.page.wait_for_timeout(100)
@@ -116,15 +125,10 @@ class ViewerPage:
 
     def settle(self) -> ViewerPage:
         """Wait until two more frames have been drawn."""
-        before = self.page.evaluate(
-            "() => { window.__viserMutable.requestRender();"
-            " return window.__viserTestpoints.rendererInfo.render.frame; }"
-        )
+        before = self.page.evaluate(f"() => ({_DRAWN})()") or 0
+        # a page that was loaded anew meanwhile counts from the start
         self._wait(
-            "f => { window.__viserMutable.requestRender();"
-            " return window.__viserTestpoints.rendererInfo.render.frame >= f + 2; }",
-            before,
-            DRAW_TIMEOUT_S,
+            f"f => {{ const n = ({_DRAWN})(); return n !== null && (n < f || n >= f + 2); }}", before, DRAW_TIMEOUT_S
         )
         return self
 
@@ -199,6 +203,11 @@ class ViewerPage:
         """The page's own matrices, and where the 3D view lies in the page."""
         view: dict[str, Any] = self.page.evaluate(_WORLD_TO_CLIP)
         return view
+
+    def _view_if_any(self) -> object:
+        """The view; something else each time while the page is being loaded anew."""
+        is_there = self.page.evaluate("() => Boolean(window.__viserMutable?.camera && window.__viserMutable.canvas)")
+        return self._view() if is_there else object()
 
     def _dismiss(self, title: str) -> None:
         """Close viser's own notice with this title, which lies over the view."""

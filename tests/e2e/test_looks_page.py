@@ -29,6 +29,8 @@ def test_the_dark_is_remembered_and_a_tablet_keeps_room_for_the_scene(app, open_
     viewer.wait_until(lambda: viewer.page.evaluate(SCHEME) == "dark")
     viewer.open(app.address).wait_until_drawn(300)
     viewer.wait_until(lambda: viewer.page.evaluate(SCHEME) == "dark")
+    viewer.page.mouse.move(512, 400)
+    viewer.page.mouse.wheel(0, 4000)  # away from the room, so that there is ground beside it
     viewer.wait_until(lambda: viewer.canvas_pixels()[40, 40].max() < 60)
     color = "() => getComputedStyle(document.querySelector('.gazeloc-card')).backgroundColor"
     assert viewer.page.evaluate(color) == "rgb(29, 48, 56)"

@@ -146,6 +146,10 @@ SIDE_TABS = (
 )
 
 
+_LAST = 1e9
+"""viser counts widgets from the start of the process; tabs come after whatever has such a number."""
+
+
 class Panels:
     """All panels of one app: the main one on the right, jobs and loupe above its tabs, the other on the left."""
 
@@ -154,7 +158,7 @@ class Panels:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(MAIN_WIDTH_PX)
         self._parts: list[Panel] = [JobBar(gui, desk.dispatch), LoupePanel(gui, desk.data)]
-        self._add(gui.add_tab_group(order=1000), MAIN_TABS, desk)
+        self._add(gui.add_tab_group(order=_LAST), MAIN_TABS, desk)
         side = gui.add_panel()
         self._add(side, SIDE_TABS, desk)
         side.dock_left()
