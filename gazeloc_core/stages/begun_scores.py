@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import io
-import time
 from collections.abc import Mapping
 from dataclasses import astuple, fields
+from functools import partial
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
-from gazeloc_core.arrays import Floats
+from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.evaluation.agreement import Agreement
 from gazeloc_core.evaluation.picture_tiles import TABLE_WIDTH, Tiles
-from gazeloc_core.storage.files import write_bytes_atomically
+from gazeloc_core.storage.begun_file import Arrays, BegunFile
 
 COLUMNS = tuple(field.name for field in fields(Agreement))
 _KEEP_EVERY_S = 5.0
@@ -27,13 +25,14 @@ class BegunScores:
     """
 
     def __init__(self, path: Path, key: str, count: int):
-        self._path, self._key = path, key
-        self._saved_at = time.monotonic()
+        self._file = BegunFile(path, key, _KEEP_EVERY_S)
         self._table = np.full((count, len(COLUMNS)), np.nan)
         self.is_done = np.zeros(count, np.bool_)
         self.tiles: dict[int, Tiles] = {}
-        if path.is_file():
-            self._load()
+        kept = self._file.read(partial(_kept, count))
+        if kept is not None:
+            done, scores, self.tiles = kept
+            self._table[done], self.is_done[done] = scores, True
 
     def put(self, index: int, found: Agreement) -> None:
         """Keep a frame's score."""
@@ -52,35 +51,27 @@ class BegunScores:
     def save(self) -> None:
         """Write what there is."""
         done, tables = np.flatnonzero(self.is_done), [tiles.table() for tiles in self.tiles.values()]
-        content = io.BytesIO()
-        np.savez(
-            content,
-            of=np.array(self._key),
-            done=done,
-            scores=self._table[done],
-            tiles_of=np.array(list(self.tiles), dtype=np.int64),
-            tile_counts=np.array([len(table) for table in tables], dtype=np.int64),
-            tiles=np.concatenate([np.zeros((0, TABLE_WIDTH), np.float32), *tables]),
+        self._file.write(
+            {
+                "done": done,
+                "scores": self._table[done],
+                "tiles_of": np.array(list(self.tiles), dtype=np.int64),
+                "tile_counts": np.array([len(table) for table in tables], dtype=np.int64),
+                "tiles": np.concatenate([np.zeros((0, TABLE_WIDTH), np.float32), *tables]),
+            }
         )
-        write_bytes_atomically(self._path, content.getvalue())
-        self._saved_at = time.monotonic()
 
     def forget(self) -> None:
         """All is done: remove the file."""
-        self._path.unlink(missing_ok=True)
+        self._file.forget()
 
     def _save_sometimes(self) -> None:
-        if time.monotonic() - self._saved_at > _KEEP_EVERY_S:
+        if self._file.is_due:
             self.save()
 
-    def _load(self) -> None:
-        try:
-            with np.load(self._path, allow_pickle=False) as file:
-                if str(file["of"]) != self._key:
-                    return
-                done, scores = file["done"], file["scores"]
-                tables = np.split(file["tiles"], np.cumsum(file["tile_counts"])[:-1])
-                tiles = dict(zip(file["tiles_of"].tolist(), map(Tiles.of_table, tables), strict=False))
-            self._table[done], self.is_done[done], self.tiles = scores, True, tiles
-        except (OSError, ValueError, KeyError, IndexError, EOFError, BadZipFile):
-            self.is_done[:] = False  # damaged: all is done anew
+
+def _kept(count: int, arrays: Arrays) -> tuple[Ints, Floats, dict[int, Tiles]]:
+    done, scores = arrays["done"], arrays["scores"]
+    np.zeros((count, len(COLUMNS)))[done] = scores  # an error where they do not fit
+    tables = np.split(arrays["tiles"], np.cumsum(arrays["tile_counts"])[:-1])
+    return done, scores, dict(zip(arrays["tiles_of"].tolist(), map(Tiles.of_table, tables), strict=False))

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import json
-import time
-from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
-from gazeloc_core.errors import GeometryError
 from gazeloc_core.localize.track_evidence import Refusal
 from gazeloc_core.localize.tracking import TRACKED_COLUMNS, Tracking, joined
 from gazeloc_core.sfm_model import TrackedFrames
 from gazeloc_core.storage.artifacts import Artifact
-from gazeloc_core.storage.files import write_bytes_atomically
+from gazeloc_core.storage.begun_file import Arrays, BegunFile
 
 _KEEP_EVERY_S = 10.0
 
@@ -26,13 +21,10 @@ class BegunTracking:
 
     def __init__(self, artifact: Artifact, key: str):
         """`key` names the inputs and options."""
-        self._path: Path = artifact.folder.with_name("tracking.begun.npz")
-        self._key = key
-        self._saved_at = time.monotonic()
-        self._parts: dict[int, list[Tracking]] = {}
-        self._count: dict[int, int] = {}
-        if self._path.is_file():
-            self._load()
+        self._file = BegunFile(artifact.folder.with_name("tracking.begun.npz"), key, _KEEP_EVERY_S)
+        self._parts: dict[int, list[Tracking]]
+        self._count: dict[int, int]
+        self._parts, self._count = self._file.read(_made) or ({}, {})
 
     def stretches(self, rank: int) -> int:
         """How many stretches of a model are done."""
@@ -42,7 +34,7 @@ class BegunTracking:
         """One more stretch of a model is done."""
         self._parts.setdefault(rank, []).append(stretch)
         self._count[rank] = self.stretches(rank) + 1
-        if time.monotonic() - self._saved_at > _KEEP_EVERY_S:
+        if self._file.is_due:
             self.save()
 
     def joined(self, rank: int) -> Tracking:
@@ -58,27 +50,18 @@ class BegunTracking:
             self._parts[rank] = [whole]
             arrays |= {f"{rank}_{name}": getattr(whole.tracked, name) for name in TRACKED_COLUMNS}
             models[str(rank)] = {"stretches": self.stretches(rank), "tried": whole.tried, "refused": whole.refused}
-        content = io.BytesIO()
-        np.savez(content, said=np.array(json.dumps({"of": self._key, "models": models})), **arrays)
-        write_bytes_atomically(self._path, content.getvalue())
-        self._saved_at = time.monotonic()
+        self._file.write(arrays | {"models": np.array(json.dumps(models))})
 
     def forget(self) -> None:
         """The run has ended."""
-        self._path.unlink(missing_ok=True)
+        self._file.forget()
 
-    def _load(self) -> None:
-        try:
-            with np.load(self._path, allow_pickle=False) as file:
-                said = json.loads(str(file["said"]))
-                if said["of"] != self._key:
-                    return
-                parts, count = {}, {}
-                for rank, model in said["models"].items():
-                    columns = {name: file[f"{rank}_{name}"] for name in TRACKED_COLUMNS}
-                    refused = {Refusal(why): int(times) for why, times in model["refused"].items()}
-                    parts[int(rank)] = [Tracking(TrackedFrames(**columns), int(model["tried"]), refused)]
-                    count[int(rank)] = int(model["stretches"])
-        except (OSError, EOFError, BadZipFile, KeyError, TypeError, ValueError, AttributeError, GeometryError):
-            return
-        self._parts, self._count = parts, count
+
+def _made(arrays: Arrays) -> tuple[dict[int, list[Tracking]], dict[int, int]]:
+    parts, count = {}, {}
+    for rank, model in json.loads(str(arrays["models"])).items():
+        columns = {name: arrays[f"{rank}_{name}"] for name in TRACKED_COLUMNS}
+        refused = {Refusal(why): int(times) for why, times in model["refused"].items()}
+        parts[int(rank)] = [Tracking(TrackedFrames(**columns), int(model["tried"]), refused)]
+        count[int(rank)] = int(model["stretches"])
+    return parts, count
