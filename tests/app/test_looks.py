@@ -127,9 +127,11 @@ def test_the_first_steps_say_what_comes_next(app):
 class TestTheFirstStepFitsTheProject:
     """One empty project of each kind: what its card says to do first."""
 
-    def card(self, project):
-        panel = FirstSteps(MagicMock(), ProjectData(project))
-        panel.render(AppState(("walk",), "walk"))
+    def card(self, project, *actions):
+        panel, state = FirstSteps(MagicMock(), ProjectData(project)), AppState(("walk",), "walk")
+        for action in actions:
+            state = action.apply(state)
+        panel.render(state)
         return panel._card.content
 
     def without_stages(self, project, **changes):
@@ -140,6 +142,12 @@ class TestTheFirstStepFitsTheProject:
     def test_nothing_was_run(self, tmp_path):
         card = self.card(self.without_stages(make_app_project(tmp_path)))
         assert "Process.</b> Press “Run everything” below: it finds the cameras from the frames" in card
+
+    def test_a_run_that_is_under_way_is_not_asked_for(self, tmp_path):
+        start = StartJob("Run everything", tasks.run_all, (("recording", "walk"),))
+        card = self.card(self.without_stages(make_app_project(tmp_path)), start)
+        assert "Process.</b> “Run everything” is at work, see above." in card
+        assert "Press" not in card
 
     def test_with_a_model_of_colmap(self, tmp_path):
         project = make_app_project(tmp_path)
