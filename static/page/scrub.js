@@ -33,6 +33,7 @@ window.gazelocScrub = (() => {
     if (!told || !Number.isFinite(number)) return;
     number = Math.min(Math.max(Math.round(number), 0), told.last);
     asked = { number, show: told.show };
+    window.gazelocView.wait();
     clearTimeout(patience);
     patience = setTimeout(giveIn, PATIENCE_MS);
     place(number);

@@ -166,6 +166,47 @@ def test_two_people_who_scrub_at_once_end_at_one_frame(page, open_page):
     shown(other, page.state.frame)
 
 
+_DRAW_SLOWLY = """() => {
+  const scene = window.__viserMutable.scene, before = scene.onBeforeRender;
+  window.__draws = 0;
+  scene.onBeforeRender = function (...all) {
+    before.apply(this, all);
+    window.__draws += 1;
+    const end = performance.now() + 150;
+    while (performance.now() < end);
+  };
+}"""
+_MOVE_ON_END = """async (frames) => {
+  const before = window.__draws;
+  for (const frame of frames) {
+    window.gazelocScrub.go(frame);
+    await new Promise((done) => setTimeout(done, 80));
+  }
+  return window.__draws - before;
+}"""
+
+
+def test_a_view_that_is_slow_to_draw_waits_while_frames_are_gone_through_and_follows_then(page):
+    show(page, 4)
+    page.page.evaluate(_DRAW_SLOWLY)
+    page.page.wait_for_function("() => window.gazelocView.paceMs() > 120", timeout=60_000)
+    draws = page.page.evaluate(_MOVE_ON_END, [2, 6, 8, 10, 12, 14, 8, 6, 2, 4, 10, 12])
+    assert draws <= 2  # 4 where it does not wait
+    shown(page, 12)
+    seen = page.page.evaluate("window.__draws")
+    camera = page.app.data.trajectory("walk", page.app.data.poses_key("walk", page.state.annotation)).pose(12)
+    page.page.wait_for_function(
+        """([x, y, z]) => {
+          const camera = window.__viserMutable.nodeRefFromName['/selected'];
+          const at = camera ? camera.position : {};
+          return Math.hypot(at.x - x, at.y - y, at.z - z) < 1e-3;
+        }""",
+        arg=camera.translation.tolist(),
+        timeout=60_000,
+    )
+    page.page.wait_for_function(f"() => window.__draws > {seen}", timeout=60_000)
+
+
 def test_a_frame_that_cannot_be_read_says_so_where_its_picture_would_be(page):
     path = page.app.data.recording("walk").path / "f_003.png"
     path.write_bytes(path.read_bytes()[:300])
