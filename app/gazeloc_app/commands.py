@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -59,7 +60,7 @@ def new(
     )
     project = Project.create(folder, settings)
     print("\n".join(notes))
-    print(f"{folder}: a project with the recording {name!r}. Next: gazeloc run {folder}")
+    print(f"{folder}: a project with the recording {name!r}. Next: gazeloc run {_in_shell(folder)}")
     return project
 
 
@@ -71,7 +72,7 @@ def add(folder: Path, *, name: str | None, recording: RecordingEntry) -> None:
         name = name or _name_of(recording.path)
         project.add_recording(name, recording)
     print("\n".join(notes))
-    print(f"{folder}: the recording {name!r} was added. Next: gazeloc run {folder}")
+    print(f"{folder}: the recording {name!r} was added. Next: gazeloc run {_in_shell(folder)}")
 
 
 def run(folder: Path, *, method: str, recording: str | None, between: str | None = None) -> None:
@@ -178,7 +179,7 @@ def protocol(
     name, recording = next(iter(project.settings.recordings.items()))
     print("\n".join(open_recording(recording.path).notes))
     print(f"{folder}: a project with the recording {name!r}, frames held out of {scan}; its truth is their own poses.")
-    print(f"Next: gazeloc run {folder}; gazeloc evaluate {folder}")
+    print(f"Next: gazeloc run {_in_shell(folder)}; gazeloc evaluate {_in_shell(folder)}")
     return project
 
 
@@ -231,6 +232,11 @@ def _checked_recording(recording: RecordingEntry) -> list[str]:
     if recording.colmap is not None:
         own_frames_of_model(opened, recording.colmap, recording.colmap_times)
     return list(opened.notes)
+
+
+def _in_shell(folder: Path) -> str:
+    """The folder as it is typed into a shell: names have spaces and quotes."""
+    return shlex.quote(str(folder))
 
 
 def _name_of(path: Path) -> str:

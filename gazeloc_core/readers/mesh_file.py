@@ -1,4 +1,8 @@
-"""A bare mesh: PLY, OBJ, STL or GLB. GLB is in metres with y up by its standard; the others do not say, so we ask."""
+"""A bare mesh: PLY, OBJ, STL or GLB. GLB is in metres with y up by its standard; the others do not say, so we ask.
+
+Programs break GLB's standard, and write millimetres or z up. So what people say counts more than the standard, and
+where nobody said anything, a room as large as a town is asked about too.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,8 @@ ENDINGS = (".ply", ".obj", ".glb", ".stl")
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
 REMEDY = "export it again"
+PLAUSIBLE_M = (0.05, 300.0)
+"""The longest side of what people scan: from a cup to a factory hall."""
 
 
 def recognise(path: Path) -> str | None:
@@ -50,12 +56,15 @@ def read(path: Path, unit: str | None, up_axis: str | None, report: Report) -> R
     else:
         mesh = mesh_through_trimesh(file)
     if file.suffix.lower() == ".glb":
-        unit, up_axis = _as_standard(file, unit, "m", "unit"), _as_standard(file, up_axis, "y", "up axis")
+        notes.extend(_against_standard(unit, up_axis))
+        unit, up_axis = unit or (None if _implausible(mesh, "m") else "m"), up_axis or "y"
     if unit is None or up_axis is None:
         raise InputError(_question(file, mesh, unit, up_axis))
     scale = METRES_PER_UNIT[unit]
     size = np.ptp(mesh.bounds, axis=0) * scale
     notes.append(f"The mesh is {_size_text(size)} m, read in {unit} with {up_axis} up.")
+    if (odd := _implausible(mesh, unit)) is not None:
+        notes.append(f"That is {odd} for a scan: if the unit is another one, make the project anew with --unit.")
     scaled = Mesh(mesh.vertices * scale, mesh.faces, mesh.colors, mesh.texture)
     return RoomScan(path, f"{file.suffix[1:].upper()} mesh", scaled, up_axis=up_axis, notes=tuple(notes))
 
@@ -77,12 +86,19 @@ def missing_pictures(pictures: list[Path]) -> list[str]:
     return [f"The material names the picture {p.name}, which is not there." for p in pictures if not p.is_file()]
 
 
-def _as_standard(file: Path, given: str | None, standard: str, what: str) -> str:
-    if given not in (None, standard):
-        raise InputError.of(
-            file, f"GLB has the {what} {standard!r} by its standard, not {given!r}", f"leave the {what} out"
-        )
-    return standard
+def _against_standard(unit: str | None, up_axis: str | None) -> list[str]:
+    """A sentence where people say otherwise than GLB's standard."""
+    if unit in (None, "m") and up_axis in (None, "y"):
+        return []
+    return [f"By its standard a GLB is in m with y up; this one is read in {unit or 'm'} with {up_axis or 'y'} up."]
+
+
+def _implausible(mesh: Mesh, unit: str) -> str | None:
+    """How odd the mesh's size would be in this unit: too large, too small, or None."""
+    longest = float(np.ptp(mesh.bounds, axis=0).max()) * METRES_PER_UNIT[unit]
+    if longest > PLAUSIBLE_M[1]:
+        return "very large"
+    return "very small" if longest < PLAUSIBLE_M[0] else None
 
 
 def _question(file: Path, mesh: Mesh, unit: str | None, up_axis: str | None) -> str:

@@ -46,8 +46,20 @@ def test_glb_is_metres_and_y_up_and_its_nodes_are_placed(tmp_path):
     assert scan.up_axis == "y"
     expected = CORNERS @ move[:3, :3].T + move[:3, 3]
     np.testing.assert_allclose(scan.mesh.bounds, [expected.min(axis=0), expected.max(axis=0)], atol=1e-6)
-    with pytest.raises(InputError, match="by its standard"):
-        open_scan(tmp_path / "room.glb", unit="cm")
+
+
+def test_what_people_say_of_a_glb_counts_more_than_its_standard(tmp_path):
+    scan = open_scan(write_box(tmp_path / "room.glb", scale=1000), unit="mm", up_axis="z")
+    np.testing.assert_allclose(scan.mesh.bounds, [[0, 0, 0], ROOM_M], atol=1e-6)
+    assert scan.up_axis == "z"
+    assert any("read in mm with z up" in note and "standard" in note for note in scan.notes)
+
+
+def test_a_glb_as_large_as_a_town_is_asked_for_its_unit(tmp_path):
+    town = write_box(tmp_path / "room.glb", scale=1000)
+    with pytest.raises(InputError, match=r"4e\+03 x .* if in m, .* 4 x 2.6 x 3 m if in mm.*--unit"):
+        open_scan(town)
+    assert any("very large" in note for note in open_scan(town, unit="m").notes)
 
 
 def quadrant_picture():
