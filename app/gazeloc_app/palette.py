@@ -49,6 +49,9 @@ POINTS: Rgb = (90, 160, 220)
 """Points of a reconstruction without colours."""
 SHOWN_FRAME: Rgb = (255, 200, 0)
 GAZE: Rgb = (230, 60, 200)
+"""In the scene, and as a ring in the frame."""
+AIM: Rgb = (255, 0, 200)
+"""Of the crosshairs of lens and loupe, on a white rim."""
 TAPE: Rgb = (0, 190, 235)
 GROUND: Rgb = (150, 158, 168)
 AXES: tuple[Rgb, Rgb, Rgb] = ((213, 94, 0), (0, 158, 115), (0, 114, 178))
@@ -59,6 +62,8 @@ PEOPLE = SERIES
 """By their numbers."""
 CHART_TEXT: Rgb = (123, 135, 148)
 """Legible in light and dark."""
+CLEAR = "rgba(0,0,0,0)"
+"""No colour, as charts want it."""
 
 
 @dataclass(frozen=True)
@@ -126,14 +131,28 @@ _MEANINGS: dict[str, tuple[str, str]] = {
     "muted": ("#66707a", "#a3adb7"),
     "line": ("#d5dade", "#495057"),
     "card": ("#eef5f8", "#1d3038"),
+    "ink": ("#1f2933", "#e9ecef"),
+    "on-brand": ("#ffffff", "#000000"),
+    "hover": ("#1c6e8c24", "#54b2d62e"),
+    "faint": ("#88888822", "#88888833"),
 }
 """In the light and in the dark."""
+_ON_PICTURES: dict[str, str] = {
+    "aim": hexadecimal(AIM),
+    "gaze": hexadecimal(GAZE),
+    "light": "#ffffff",
+    "dark": "#16191c",
+    "veil": "#16191cd9",
+    "shadow": "#00000080",
+    "alarm": "#7a2e0e",
+}
+"""The same in light and dark: on frames and renders, behind them, and of the banner over the whole page."""
 TEXT_MEANINGS = ("good", "warning", "bad", "muted")
 
 
 def meaning(name: str) -> str:
-    """A colour that means something, for style attributes: it follows the page into the dark."""
-    assert name in _MEANINGS
+    """A colour that means something, for style attributes; those of _MEANINGS follow the page into the dark."""
+    assert name in _MEANINGS or name in _ON_PICTURES
     return f"var(--gazeloc-{name})"
 
 
@@ -164,5 +183,6 @@ def theme_color(*, is_dark: bool) -> Rgb:
 def css() -> str:
     """The style sheet that defines all of them; Mantine, which viser is built with, marks the page that is dark."""
     light = "".join(f"--gazeloc-{name}:{values[0]};" for name, values in _MEANINGS.items())
+    light += "".join(f"--gazeloc-{name}:{value};" for name, value in _ON_PICTURES.items())
     dark = "".join(f"--gazeloc-{name}:{values[1]};" for name, values in _MEANINGS.items())
     return f':root{{{light}}}\n:root[data-mantine-color-scheme="dark"]{{{dark}}}\n'

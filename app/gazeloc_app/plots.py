@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from gazeloc_app.palette import CHART_TEXT, SERIES, hexadecimal
+from gazeloc_app.palette import CHART_TEXT, CLEAR, SERIES, hexadecimal
 from gazeloc_core.charts.values import Chart, Drawing, HeatMap, Series
 
 
@@ -28,8 +28,8 @@ def to_plotly(drawing: Drawing) -> go.Figure:
         legend={"orientation": "h", "y": -0.2},
         font={"size": 11, "color": hexadecimal(CHART_TEXT)},
         template="plotly_white",
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+        paper_bgcolor=CLEAR,
+        plot_bgcolor=CLEAR,
         modebar={"remove": ["zoom", "pan", "select", "lasso", "zoomIn", "zoomOut", "autoScale", "resetScale"]},
     )
     if isinstance(drawing, Chart) and drawing.log_y:

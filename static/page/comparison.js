@@ -139,6 +139,7 @@ window.gazelocComparison = (() => {
   // Show a frame: at once where its pictures are here, else when they come; of those asked for meanwhile the last.
   function show(what) {
     if (!what) return;
+    if (!shown) stage.style.setProperty("--gazeloc-aspect", choice.lens ? what.lensAspect : what.aspect);
     if (loading && loading.turn === turn && isSame(loading, what)) {
       Object.assign(loading, what);
       if (shown === loading) describe(shown);

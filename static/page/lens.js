@@ -68,7 +68,7 @@ window.gazelocLens = (function lens() {
     glass.style.top = `${below ? at.y + BESIDE : at.y - BESIDE - SIZE}px`;
     const pen = glass.getContext("2d"), scale = width / box.width, reach = (SIZE / TIMES) * scale;
     const middle = [(at.x + 0.5 - box.left) * scale, (at.y + 0.5 - box.top) * scale]; // viser clicks a pixel's middle
-    pen.fillStyle = "#222";
+    pen.fillStyle = color("dark");
     pen.fillRect(0, 0, glass.width, glass.height);
     pen.imageSmoothingEnabled = TIMES / scale < 4;
     pen.drawImage(source, middle[0] - reach / 2, middle[1] - reach / 2, reach, reach, 0, 0, glass.width, glass.height);
@@ -77,9 +77,14 @@ window.gazelocLens = (function lens() {
     timer = setTimeout(ask, AGAIN_MS);
   }
 
+  // One of the app's colours (palette.py), which a canvas cannot look up by itself.
+  function color(name) {
+    return getComputedStyle(document.documentElement).getPropertyValue(`--gazeloc-${name}`);
+  }
+
   function cross(pen, size) {
-    for (const [color, width] of [["#fff", 3], ["#ff00c8", 1.2]]) {
-      pen.strokeStyle = color;
+    for (const [stroke, width] of [[color("light"), 3], [color("aim"), 1.2]]) {
+      pen.strokeStyle = stroke;
       pen.lineWidth = (width * size) / SIZE;
       pen.beginPath();
       for (const [from, to] of [[0.3, 0.46], [0.54, 0.7]]) {

@@ -1,6 +1,8 @@
 """The app's colours: legible in light and dark, and told apart by eyes that do not see red and green as two hues."""
 
 import itertools
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from viser._messages import ThemeConfigurationMessage
 from gazeloc_core.charts.values import Chart, Series
 from gazeloc_core.frames.marks import Mark
 from gazeloc_core.methods import Method
+from gazeloc_core.resources import static_files
 from gazeloc_core.trajectory import PoseStatus
 
 # Machado, Oliveira and Fernandes 2009, severity 1: what eyes without one kind of cone see of linear sRGB.
@@ -145,3 +148,45 @@ def test_every_meaning_has_a_shade_for_the_dark():
     css = palette.css()
     for name in (*palette.TEXT_MEANINGS, "line", "card"):
         assert css.count(f"--gazeloc-{name}:") == 2
+
+
+def test_letters_are_legible_on_pictures_buttons_and_the_banner():
+    light, dark, alarm = (on_pictures(name) for name in ("light", "dark", "alarm"))
+    assert contrast(light, dark) >= 7
+    assert contrast(light, alarm) >= 7
+    assert on_pictures("veil") == dark, "and nearly opaque, so that it is as good a ground"
+    for paper, ink, brand, on_brand in zip(
+        (palette.PAPER, palette.PAPER_DARK),
+        *(palette.shades(name) for name in ("ink", "brand", "on-brand")),
+        strict=True,
+    ):
+        assert contrast(ink, paper) >= 7
+        assert contrast(on_brand, brand) >= 4.5
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_the_gaze_is_told_from_keypoints_in_a_frame_by_its_colour_and_being_a_ring(eyes):
+    for color in (palette.SCAN_SIDE, palette.SFM_SIDE, palette.SELECTED):
+        assert apart(palette.GAZE, color, EYES[eyes]) >= FROM_THE_GROUND - 1
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_the_crosshair_shows_on_any_picture_by_itself_or_by_its_rim(eyes):
+    for grey in range(0, 256, 15):
+        ground = (grey, grey, grey)
+        assert max(apart(color, ground, EYES[eyes]) for color in (palette.AIM, on_pictures("light"))) >= 25
+
+
+def test_no_colour_of_the_page_or_its_panels_is_written_elsewhere():
+    app = Path(palette.__file__).parent
+    files = [path for path in static_files("page") if path.suffix in (".css", ".js")]
+    files += [path for path in app.rglob("*.py") if path.name != "palette.py"]
+    literal = re.compile(r"""[\s"':(]#(?:[0-9a-fA-F]{3,4}|[0-9a-fA-F]{6}|[0-9a-fA-F]{8})\b|\brgba?\(\d|\bhsla?\(\d""")
+    found = [f"{path.name}: {match.group()}" for path in files for match in literal.finditer(path.read_text())]
+    assert not found
+    assert literal.search("color: #fff")
+    assert literal.search("rgba(0,0,0")
+
+
+def on_pictures(name):
+    return palette._rgb(palette._ON_PICTURES[name][:7])

@@ -24,7 +24,7 @@ from playwright.sync_api import Browser, sync_playwright  # noqa: E402
 
 from gazeloc_core.project import Project  # noqa: E402
 
-LOOKS = {"light": (1280, 800), "dark": (1280, 800), "tablet": (1024, 768), "upright": (768, 1024)}
+LOOKS = {"light": (1280, 800), "wide": (1440, 900), "dark": (1280, 800), "flat": (1180, 820), "upright": (820, 1180)}
 
 
 def main(folder: Path, out: Path, only: tuple[str, ...]) -> None:

@@ -20,6 +20,7 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from websockets.http11 import Request
 
+from gazeloc_app import palette
 from gazeloc_app.door.address import check_address, is_loopback
 from gazeloc_app.door.hosts import is_https, is_websocket
 from gazeloc_app.routes import Reply
@@ -27,8 +28,8 @@ from gazeloc_app.routes import Reply
 WRONG_COSTS_S = 1.0
 MAX_WRONG_AT_ONCE = 8
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>GazeLoc</title>{head}
-<style>body{{font:16px/1.5 system-ui,sans-serif;max-width:34em;margin:15vh auto;padding:0 1em;color:#1f2933}}
-input,button{{font:inherit;padding:.3em .6em}}</style><h1>GazeLoc</h1>{body}</html>
+<style>{colors}body{{font:16px/1.5 system-ui,sans-serif;max-width:34em;margin:15vh auto;padding:0 1em}}
+body{{color:var(--gazeloc-ink)}}input,button{{font:inherit;padding:.3em .6em}}</style><h1>GazeLoc</h1>{body}</html>
 """
 _ASK = """<p>{sentence}</p><form method="get" action="/"><input name="token" placeholder="token" autocomplete="off"
 aria-label="Token"> <button>Open</button></form><p><a href="/">Open it again</a> if you have been here before.</p>"""
@@ -118,7 +119,7 @@ def _asking(sentence: str) -> Reply:
 
 def _page(head: str, body: str, status: HTTPStatus, headers: dict[str, str]) -> Reply:
     policy = "default-src 'none'; style-src 'unsafe-inline'; form-action 'self'; frame-ancestors 'none'"
-    text = _PAGE.format(head=head, body=body)
+    text = _PAGE.format(head=head, body=body, colors=palette.css())
     return Reply(
         body=text.encode(),
         content_type="text/html; charset=utf-8",

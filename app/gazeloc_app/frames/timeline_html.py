@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal
+from gazeloc_app.palette import ERROR, MARKS, SCORE, STATUSES, hexadecimal, meaning
 from gazeloc_core.arrays import Floats, Ints
 from gazeloc_core.evaluation.agreement import LOW_SCORE
 from gazeloc_core.frames.marks import FrameMarks, Mark
@@ -97,9 +97,10 @@ def _curve(values: Floats, high: float, color: str, *, low: float = 0.0, limit: 
         if np.isfinite(at):
             pieces.append(f"{'L' if pen_is_down else 'M'}{x + 0.5:g} {at:.1f}h.01")
         pen_is_down = bool(np.isfinite(at))
-    dashed = (
-        "" if limit is None else f'<path d="M0 {29 - 28 * limit:.1f}H{len(y)}" stroke="#888" stroke-dasharray="4"/>'
-    )
+    dashed = ""
+    if limit is not None:
+        style = f'style="stroke:{meaning("muted")}" stroke-dasharray="4"'
+        dashed = f'<path d="M0 {29 - 28 * limit:.1f}H{len(y)}" {style}/>'
     return (
         f'<svg viewBox="0 0 {len(y)} 30" preserveAspectRatio="none">{dashed}'
         f'<path d="{"".join(pieces)}" stroke="{color}" fill="none"/></svg>'

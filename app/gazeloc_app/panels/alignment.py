@@ -14,6 +14,7 @@ from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.actions.live import FollowKeypoints
 from gazeloc_app.data import ProjectData
 from gazeloc_app.keypoints.live_alignment import is_following
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.work import tasks
 from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod
@@ -30,10 +31,9 @@ METHODS = {
 }
 
 
-NONE_YET = widgets.card(
-    "No alignment yet.",
+NONE_YET = (
     "The reconstruction stands in the middle of the scan until it has one. Tags that both saw, or three keypoints, "
-    "make one: press Align.",
+    "make one: press Align."
 )
 
 
@@ -73,7 +73,8 @@ class AlignmentPanel:
             widgets.set_property(handle, "disabled", state.has_job(handle.label))
         widgets.set_value(self._live, is_following(self._data, state))
         widgets.set_content(self._note, _note_html(state.fit_note))
-        seen = (state.recording, state.annotation.alignment, state.data_revision)
+        at_work = meanwhile(state, tasks.run_all, tasks.align)
+        seen = (state.recording, state.annotation.alignment, state.data_revision, at_work)
         if seen == self._seen:
             return
         self._seen = seen
@@ -88,7 +89,8 @@ class AlignmentPanel:
 
     def _evidence_html(self, state: AppState, chosen: Alignment | None) -> str:
         if chosen is None:
-            return NONE_YET
+            how = meanwhile(state, tasks.run_all, tasks.align) or NONE_YET
+            return widgets.card("No alignment yet.", how)
         before = self._data.alignment(state.recording, chosen.parent)
         columns = [("", chosen)] if before is None else [("before", before), ("after", chosen)]
         rows = [[widgets.text(name), *(_cell(alignment) for _, alignment in columns)] for name, _cell in _ROWS]

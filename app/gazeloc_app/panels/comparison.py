@@ -20,7 +20,9 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.frame_marks import marks_in_frame
 from gazeloc_app.frames.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.state import AppState, Layer
+from gazeloc_app.work import tasks
 
 _HOME = """<div class="gazeloc-comparison">
   <img alt="" src="data:," style="display:none" onerror="gazelocComparison.home(this.parentNode)">
@@ -51,7 +53,7 @@ class ComparisonHtml:
             "NUMBER": str(frame),
             "LAST": str(len(self._data.recording(state.recording)) - 1),
             "SHOW_URL": f"/show/{quote(state.recording)}/",
-            "NONE": self._why_none(state.recording, key, frame),
+            "NONE": self._why_none(state, key, frame),
             "MARKS": str(self._revision_of_marks(state)),
             **self._pictures(state, key, other),
             **self._shapes(state, frame),
@@ -71,10 +73,11 @@ class ComparisonHtml:
             self._marks_revision += 1
         return self._marks_revision
 
-    def _why_none(self, recording: str, key: str | None, frame: int) -> str:
-        trajectory = self._data.trajectory(recording, key)
+    def _why_none(self, state: AppState, key: str | None, frame: int) -> str:
+        trajectory = self._data.trajectory(state.recording, key)
         if trajectory is None or not trajectory.has_pose.any():
-            return NO_POSES
+            at_work = meanwhile(state, tasks.run_all, tasks.align)
+            return f"No poses yet: {at_work}" if at_work else NO_POSES
         return NO_POSE if frame >= len(trajectory) or not trajectory.has_pose[frame] else ""
 
     def _keypoints_svg(self, state: AppState, frame: int) -> str:

@@ -12,6 +12,7 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.paths import folder_inside
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.work import tasks
 from gazeloc_core.errors import InputError
@@ -22,9 +23,7 @@ FORMATS = {
     "colmap": ("COLMAP", "the reconstruction as a COLMAP model in scan coordinates"),
     "nerfstudio": ("nerfstudio", "transforms.json with the undistorted frames"),
 }
-NO_POSES = widgets.box(
-    widgets.card("No poses to export yet.", "“Run everything” in the tab Project makes them, or an alignment does.")
-)
+NO_POSES = "“Run everything” in the tab Project makes them, or an alignment does."
 
 
 class ExportPanel:
@@ -41,7 +40,7 @@ class ExportPanel:
         self._root = root
         self._folder = gui.add_text("Folder", "", hint="A name, of a folder that is made in the one below.")
         self._button = gui.add_button("Export", hint="Writes on the computer that runs GazeLoc.")
-        self._first = gui.add_html(NO_POSES, visible=False)
+        self._first = gui.add_html("", visible=False)
         gui.add_html(widgets.box(f"Into {widgets.text(root)}."))
         gui.add_html(widgets.box("Exported frames show people. Treat them like the recordings themselves."))
         widgets.on_user(self._button, lambda _: self._export(), event="on_click")
@@ -51,6 +50,8 @@ class ExportPanel:
         self._recording = state.recording
         self._has_poses = self._data.poses_key(state.recording, state.annotation) is not None
         widgets.set_property(self._first, "visible", not self._has_poses)
+        how = meanwhile(state, tasks.run_all, tasks.align) or NO_POSES
+        widgets.set_content(self._first, widgets.box(widgets.card("No poses to export yet.", how)))
         widgets.set_property(self._button, "disabled", state.has_job("Export"))
 
     def _export(self) -> None:

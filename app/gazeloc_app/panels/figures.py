@@ -11,15 +11,14 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.plots import to_plotly
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
 from gazeloc_app.work.outcome import Task
 
 NONE = "(not drawn yet)"
-NONE_YET = widgets.card(
-    "No figure yet.", "Press “Draw the figures”; they are drawn from the tags that “Run everything” found."
-)
+NONE_YET = "Press “Draw the figures”; they are drawn from the tags that “Run everything” found."
 
 
 class FigurePanel:
@@ -52,7 +51,8 @@ class FigurePanel:
         self._recording = state.recording
         for button in (self._draw, self._advise):
             widgets.set_property(button, "disabled", state.has_job(button.label))
-        seen = (state.recording, state.data_revision)
+        at_work = meanwhile(state, tasks.run_all, tasks.draw_figures, tasks.draw_advice)
+        seen = (state.recording, state.data_revision, at_work)
         if seen == self._seen:
             return
         self._seen = seen
@@ -61,7 +61,8 @@ class FigurePanel:
         if tuple(self._which.options) != options:
             self._which.options = options
         said = "<br>".join(widgets.text(note) for note in notes)
-        widgets.set_content(self._notes, widgets.box(said if charts or notes else NONE_YET))
+        none_yet = widgets.card("No figure yet.", at_work or NONE_YET)
+        widgets.set_content(self._notes, widgets.box(said if charts or notes else none_yet))
         self._show(str(self._which.value))
 
     def _show(self, name: str) -> None:

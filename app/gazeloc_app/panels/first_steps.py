@@ -8,12 +8,11 @@ from viser import GuiApi
 
 from gazeloc_app import widgets
 from gazeloc_app.data import ProjectData
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.state import AppState
 
 ENOUGH_PAIRS = 3
 _CLICK = "set three keypoints, each on the scan and in the reconstruction (tab Keypoints); then Align."
-
-_MEANWHILE = "“{}” is at work, see above. Look around or set keypoints meanwhile."
 
 
 class Step(NamedTuple):
@@ -34,9 +33,9 @@ class FirstSteps:
     def render(self, state: AppState) -> None:
         """Show how far this recording is."""
         steps = self._steps(state)
-        job = state.job
-        if job is not None and job.recording in (None, state.recording):
-            steps = tuple(step._replace(how=_MEANWHILE.format(job.name)) for step in steps)
+        at_work = meanwhile(state)
+        if at_work:
+            steps = tuple(step._replace(how=f"{at_work} Look around or set keypoints meanwhile.") for step in steps)
         is_needed = not all(step.is_done for step in steps)
         widgets.set_property(self._card, "visible", is_needed)
         widgets.set_content(self._card, widgets.box(_card_html(steps)) if is_needed else "")

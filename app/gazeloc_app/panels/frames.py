@@ -20,6 +20,7 @@ from gazeloc_app.frames.sightings import image_of_frame
 from gazeloc_app.frames.timeline_html import MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.panels.playing import PlayWidgets
 from gazeloc_app.panels.scrubber import Scrubber
 from gazeloc_app.state import AppState, Layer
@@ -87,7 +88,7 @@ class FramePanel:
             self._seen_timeline = found
             self._render_timeline(state, key)
             self._render_others(state)
-        seen = (found, keypoints, state.frame, state.renderer_note, state.draws_tags)
+        seen = (found, keypoints, state.frame, state.renderer_note, state.draws_tags, meanwhile(state))
         if seen == self._seen:
             return
         self._seen = seen

@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 from viser import GuiApi
 
-from gazeloc_app import widgets
+from gazeloc_app import palette, widgets
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.frame_marks import Mark, marks_in_frame
@@ -98,7 +98,7 @@ def _spread(frames: list[int], most: int = 24) -> list[int]:
 def _box(url: str, picture: tuple[float, float, float, float], names: str, caption: str) -> str:
     """A square that shows a part of a picture, whose left, top, width and height in it are given in pixels."""
     left, top, wide, high = picture
-    background = f"#222 url('{url}') {left:.1f}px {top:.1f}px/{wide:.1f}px {high:.1f}px no-repeat"
+    background = f"{palette.meaning('dark')} url('{url}') {left:.1f}px {top:.1f}px/{wide:.1f}px {high:.1f}px no-repeat"
     cross = "".join(
         f'<i style="{along}:{share}%;{across}:50%;{size}:15%;{thin}:1px"></i>'
         for along, across, size, thin in (("top", "left", "height", "width"), ("left", "top", "width", "height"))

@@ -21,6 +21,12 @@ from gazeloc_app.work import tasks
 from gazeloc_core.methods import Method
 from gazeloc_core.trajectory import Trajectory
 
+_COLUMNS = (
+    "Frames: those that were localised. Mean error: of these, against the ground truth. "
+    "Apart: the median distance from the poses of the method above."
+)
+_NO_TRUTH = "This recording has no ground truth, so no errors."
+
 
 class MethodPanel:
     """Which method is shown and exported, which are compared with it, and how they differ."""
@@ -73,29 +79,31 @@ class MethodPanel:
             trajectory = self._trajectory(state, method)
             color = state.cameras.estimate if method is state.annotation.method else state.cameras.methods[method]
             name = widgets.colored("■", hexadecimal(color)) + f" {widgets.text(method.value)}"
+            name = f'<span title="{widgets.text(method.summary)}">{name}</span>'
             if trajectory is None:
-                rows.append([name, widgets.colored("not run", widgets.MUTED), "", "", ""])
+                rows.append([name, widgets.colored("not run", widgets.MUTED), "", ""])
             else:
                 rows.append([name, *self._cells(state, method, trajectory, shown)])
-        return widgets.html_table(["Method", "Frames", "Mean error", "", "Apart"], rows)
+        has_truth = self._data.truth(state.recording) is not None
+        note = widgets.colored(_COLUMNS if has_truth else f"{_NO_TRUTH} {_COLUMNS}", widgets.MUTED)
+        return widgets.html_table(["Method", "Frames", "Mean error", "Apart"], rows) + note
 
     def _cells(
         self, state: AppState, method: Method, trajectory: Trajectory, shown: Trajectory | None
-    ) -> tuple[str, str, str, str]:
+    ) -> tuple[str, str, str]:
         """Frames localised, mean errors of these against the truth, and the median distance from the shown poses."""
         is_localised = trajectory.is_localised
         errors = self._data.errors(state.recording, self._data.poses_key(state.recording, state.annotation, method))
-        position = rotation = apart = "–"
+        error = apart = "–"
         if errors is not None and is_localised.any():
-            position = widgets.centimetres(_mean(errors.position_m[is_localised]))
-            degrees = _mean(errors.rotation_deg[is_localised])
-            rotation = "–" if degrees is None else f"{degrees:.2f}°"
+            position, degrees = _mean(errors.position_m[is_localised]), _mean(errors.rotation_deg[is_localised])
+            error = widgets.centimetres(position) + ("" if degrees is None else f", {degrees:.2f}°")
         if shown is not None and shown is not trajectory:
             both = is_localised & shown.has_pose
             if both.any():
                 distance = np.linalg.norm(trajectory.centers[both] - shown.centers[both], axis=1)
                 apart = widgets.centimetres(float(np.median(distance)))
-        return f"{int(is_localised.sum())} of {len(trajectory)}", position, rotation, apart
+        return f"{int(is_localised.sum())} of {len(trajectory)}", error, apart
 
     def _render_pictures(self, state: AppState, seen: object) -> None:
         key = (seen, state.frame, state.compared)

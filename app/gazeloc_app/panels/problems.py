@@ -16,6 +16,7 @@ from gazeloc_app.data import FrameErrors, ProjectData
 from gazeloc_app.frames.offset_text import short_offset_text
 from gazeloc_app.frames.problems import FrameTable, Problem, worst_first
 from gazeloc_app.frames.timeline_html import MARK_SIGNS
+from gazeloc_app.panels.meanwhile import meanwhile
 from gazeloc_app.panels.playing import table_of
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
@@ -24,7 +25,21 @@ from gazeloc_core.frames.marks import FrameMarks, Mark
 from gazeloc_core.stages.scores import FrameScores
 
 _MOST = 40
-_FIRST = "Nothing is scored yet: “Score the frames” compares each with the scan seen from its pose."
+_FIRST = "“Score the frames” compares each with the scan seen from its pose."
+_NOTHING = {
+    "lowest score first": "No frame has a low score.",
+    "marked bad": "No frame is marked bad: the key B marks the one that is shown.",
+    "marked unsure": "No frame is marked unsure: the key U marks the one that is shown.",
+    "marked good": "No frame is marked good: the key G marks the one that is shown.",
+    "without a pose": "Every frame has a pose.",
+}
+
+_COUNTED = {
+    Problem.BAD: "marked bad",
+    Problem.UNSURE: "marked unsure",
+    Problem.NO_POSE: "without a pose",
+    Problem.LOW_SCORE: "with a low score",
+}
 
 
 class Which(StrEnum):
@@ -61,7 +76,8 @@ class ProblemPanel:
         self._state = state
         widgets.set_property(self._score, "disabled", state.has_job("Score the frames"))
         key = self._data.poses_key(state.recording, state.annotation)
-        seen = (state.recording, key, state.data_revision, state.annotation.marks)
+        at_work = meanwhile(state, tasks.score_frames)
+        seen = (state.recording, key, state.data_revision, state.annotation.marks, at_work)
         if seen != self._seen:
             self._seen = seen
             self._render_list()
@@ -73,12 +89,14 @@ class ProblemPanel:
         table = table_of(self._data, state)
         key = self._data.poses_key(state.recording, state.annotation)
         errors, scores = self._data.errors(state.recording, key), self._data.frame_scores(state.recording, key)
-        widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks, errors)))
+        how = meanwhile(state, tasks.score_frames) or _FIRST
+        widgets.set_content(self._summary, widgets.box(_summary_html(table, state.annotation.marks, errors, how)))
         frames = self._frames(table, state.annotation.marks)
         rows = "".join(_row(state, table, scores, errors, frame) for frame in frames[:_MOST])
         if len(frames) > _MOST:
             rows += f"<div>and {len(frames) - _MOST} more</div>"
-        widgets.set_content(self._list, widgets.box(f'<div class="gazeloc-frames">{rows}</div>' if rows else "None."))
+        nothing = self._nothing(table)
+        widgets.set_content(self._list, widgets.box(f'<div class="gazeloc-frames">{rows}</div>' if rows else nothing))
 
     def _frames(self, table: FrameTable, marks: FrameMarks) -> list[int]:
         which = str(self._which.value)
@@ -90,22 +108,29 @@ class ProblemPanel:
             return [one.frame_index for one in marks.marks if one.mark is wanted and one.frame_index < len(table.score)]
         return worst_first(table)
 
+    def _nothing(self, table: FrameTable) -> str:
+        """A sentence for a list without frames; "" where the summary says it already."""
+        which = Which(str(self._which.value))
+        return "" if which is Which.WORST and not np.isfinite(table.score).any() else _NOTHING[which]
+
     def _start(self) -> None:
         if self._state is not None:
             keywords = (("recording", self._state.recording), ("method", self._state.annotation.method))
             self._dispatch(StartJob("Score the frames", tasks.score_frames, keywords))
 
 
-def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | None) -> str:
+def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | None, how: str) -> str:
     known = table.score[np.isfinite(table.score)]
-    scored = f"{len(known)} frames are scored, the median is {np.median(known):.2f}." if len(known) else _FIRST
-    counts = [f"{int((table.problem == kind.value).sum())} {kind.value}" for kind in Problem if kind.value]
+    scored = widgets.card("Nothing is scored yet.", how)
+    if len(known):
+        scored = f"{len(known)} frames are scored, the median agreement is {np.median(known):.2f} of 1."
+    counts = [f"{int((table.problem == kind.value).sum())} {_COUNTED[kind]}" for kind in Problem if kind.value]
     found = {} if errors is None else errors_by_mark(marks, errors.rotation_deg, errors.position_m)
     marked = [
         f"{count} {mark.value}" + (f" (mean error {100 * found[mark].position_m.mean:.1f} cm)" if mark in found else "")
         for mark, count in marks.counts().items()
     ]
-    return f"{widgets.text(scored)}<br>Problems: {', '.join(counts)}.<br>Marks: {', '.join(marked)}."
+    return f"{scored}<div>Problems: {', '.join(counts)}.</div><div>Marks: {', '.join(marked)}.</div>"
 
 
 def _row(state: AppState, table: FrameTable, scores: FrameScores | None, errors: FrameErrors | None, frame: int) -> str:

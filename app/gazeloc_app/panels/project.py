@@ -99,7 +99,8 @@ def _running_stage(state: AppState) -> str | None:
 
 
 def _row(status: pipeline.StageStatus, *, is_running: bool) -> list[str]:
-    color, word, reason = _COLORS[status.state], status.state.value, status.reason[:160]
+    color, word = _COLORS[status.state], status.state.value
+    reason = "" if status.state is State.MISSING else status.reason[:160]  # that it waits, the stages above say
     if is_running and status.state is not State.FRESH:
         color, word, reason = widgets.GOOD, "running", ""
     return [widgets.text(status.title), widgets.colored(word, color), widgets.colored(reason, widgets.MUTED)]

@@ -62,9 +62,10 @@ def refine(folder: Path, report: Report, *, recording: str, start: str) -> Outco
     """ICP from the alignment in force; put in force only if the evidence says that it is better."""
     project = Project.open(folder)
     refinement = registration.refine_alignment(project, recording, start=start, report=report)
+    why = refinement.reason.partition(": ")[2]
     if refinement.accepted:
-        return Outcome(f"Refined: {refinement.reason}", alignment=refinement.chosen.key, by_person=True)
-    return Outcome(f"ICP was refused: {refinement.reason}", Level.WARNING)
+        return Outcome(f"Refined with ICP: {why}", alignment=refinement.chosen.key, by_person=True)
+    return Outcome(f"ICP was refused: {why}", Level.WARNING)
 
 
 def export(folder: Path, report: Report, *, recording: str, formats: tuple[str, ...], output: str) -> Outcome:
