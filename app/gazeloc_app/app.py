@@ -52,7 +52,7 @@ from gazeloc_app.work.follow_up import ScoreAfterRun
 from gazeloc_app.work.job_list import JobList
 from gazeloc_app.work.jobs import JobRunner
 from gazeloc_core import pipeline
-from gazeloc_core.errors import GazelocError, ProjectError
+from gazeloc_core.errors import GazelocError
 from gazeloc_core.project import Project
 
 log = logging.getLogger(__name__)
@@ -93,7 +93,8 @@ class App:
             first = self._settings.put_into(self.store.state)
             room = self._saver.room_after_a_kill(self._room.read())
             self.store.begin(self._saver.open(first.recording).with_room_of(room).put_into(first))
-            self.data.recording(self.store.state.recording)
+            if first.recording:
+                self.data.recording(first.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)
             self.store.dispatch(OfferJobs(self._job_list.read()))
             self.jobs = JobRunner(project.folder, self.store.dispatch)
@@ -284,6 +285,4 @@ def serve(
 
 def _empty_state(project: Project) -> AppState:
     names = tuple(project.settings.recordings)
-    if not names:
-        raise ProjectError(f"{project.folder}: the project has no recording; add one with `gazeloc add`.")
-    return AppState(names, names[0])
+    return AppState(names, names[0] if names else "")

@@ -23,7 +23,7 @@ from gazeloc_app.scene.cut import Cut
 from gazeloc_app.scene.kept import Kept
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.state import AppState, Level
-from gazeloc_app.tools.all import TOOLS, shifted, tools_of
+from gazeloc_app.tools.all import kinds_for, shifted, tools_of
 from gazeloc_app.tools.cloud_point import CloudPointTool
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.errors import GazelocError
@@ -123,14 +123,20 @@ class Browser:
 
     def _add_widgets(self) -> None:
         gui = self._client.gui
-        hints = " ".join(f"“{kind.name}”: {kind.hint}" for kind in TOOLS)
+        kinds = kinds_for(self._state())
+        hints = " ".join(f"“{kind.name}”: {kind.hint}" for kind in kinds)
         self._choice: Any = gui.add_dropdown(
             "A click",
-            tuple(kind.name for kind in TOOLS),
+            tuple(kind.name for kind in kinds),
             hint=f"In this browser only; the key P goes on. Dragging always orbits. {hints}",
         )
-        self._move = gui.add_checkbox("Move point", False, hint="The click moves the selected pair's point.")
-        self._snap = gui.add_checkbox("Snap to tags", True, hint="A click near a tag's centre or corner means that.")
+        sets_points = bool(self._state().recordings)
+        self._move = gui.add_checkbox(
+            "Move point", False, visible=sets_points, hint="The click moves the selected pair's point."
+        )
+        self._snap = gui.add_checkbox(
+            "Snap to tags", True, visible=sets_points, hint="A click near a tag's centre or corner means that."
+        )
         self._in_page = gui.add_html(_IN_PAGE[False])
         widgets.on_user(self._choice, lambda _: self._take())
         toggle = gui.add_command("Next tool", hotkey="P", description="What a click does")

@@ -221,6 +221,8 @@ class ProjectData:
 
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
         """The ground truth: times and `scan_from_camera`."""
+        if not recording:
+            return None
         entry = self._remember(f"{recording} entry", None, lambda: self.project.recording(recording))
         path = entry.truth
         return None if path is None else self._remember_or_say(f"{recording} truth", None, lambda: read_tum(path))

@@ -190,6 +190,7 @@ class AppState:
 
     recordings: tuple[str, ...]
     recording: str
+    """The one that is open; "" where the project has none."""
     annotation: Annotation = field(default_factory=Annotation)
     past: tuple[Annotation, ...] = ()
     future: tuple[Annotation, ...] = ()

@@ -41,8 +41,15 @@ class Saver:
         self._unsettled: set[str] = set()
 
     def open(self, recording: str) -> History:
-        """A recording's history, as it was left; damaged ones are put aside, and it begins anew from the files."""
+        """A recording's history, as it was left; damaged ones are put aside, and it begins anew from the files.
+
+        Without a recording ("") people decide about the room alone, which has files of its own: the steps end with
+        the app.
+        """
         if recording in self._wanted:
+            return self._wanted[recording]
+        if not recording:
+            self._committed[recording] = self._wanted[recording] = History((Annotation(),), 0)
             return self._wanted[recording]
         files = annotation_in_files(self._project, recording)
         try:
@@ -116,6 +123,9 @@ class Saver:
             self._unsettled.remove(name)
 
     def _append(self, name: str, wanted: History) -> None:
+        if not name:
+            self._committed[name] = wanted
+            return
         journal, committed = self._journals[name], self._committed[name]
         if self._lines[name] == 0 or self._lines[name] > MAX_LINES:
             lines = all_lines(wanted)

@@ -24,9 +24,10 @@ from gazeloc_app.panels.history import HistoryPanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
-from gazeloc_app.panels.layers import LayerPanel
+from gazeloc_app.panels.layers import OF_THE_ROOM, LayerPanel
 from gazeloc_app.panels.loupe import LoupePanel
 from gazeloc_app.panels.methods import MethodPanel
+from gazeloc_app.panels.no_recording import NoRecording
 from gazeloc_app.panels.problems import ProblemPanel
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.panels.suggestion import SuggestionPanel
@@ -132,6 +133,23 @@ MAIN_TABS = (
     ),
     Tab("Export", (lambda desk: ExportPanel(desk.gui, desk.export_folder, desk.data, desk.dispatch),)),
 )
+MAIN_TABS_WITHOUT_RECORDING = (
+    Tab(
+        "Project",
+        (
+            lambda desk: NoRecording(desk.gui, desk.project.folder),
+            lambda desk: JobLogs(desk.gui, str(desk.project.folder / "logs")),
+        ),
+    ),
+    Tab(
+        "Layers",
+        (
+            lambda desk: ViewList(desk.server, desk.usual_views, up_vector(desk.data.scan().up_axis), desk.dispatch),
+            lambda desk: LayerPanel(desk.gui, desk.dispatch, desk.scene.facts, OF_THE_ROOM),
+        ),
+    ),
+    Tab("History", (lambda desk: HistoryPanel(desk.gui, desk.dispatch),)),
+)
 SIDE_TABS = (
     Tab(
         "Frame",
@@ -144,6 +162,7 @@ SIDE_TABS = (
     Tab("Problems", (lambda desk: ProblemPanel(desk.gui, desk.data, desk.dispatch),)),
     Tab("Help", (lambda desk: HelpPanel(desk.gui, desk.toggle_look),)),
 )
+SIDE_TABS_WITHOUT_RECORDING = SIDE_TABS[-1:]
 
 
 _LAST = 1e9
@@ -158,9 +177,10 @@ class Panels:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(MAIN_WIDTH_PX)
         self._parts: list[Panel] = [JobBar(gui, desk.dispatch), LoupePanel(gui, desk.data)]
-        self._add(gui.add_tab_group(order=_LAST), MAIN_TABS, desk)
+        is_usual = bool(desk.state.recordings)
+        self._add(gui.add_tab_group(order=_LAST), MAIN_TABS if is_usual else MAIN_TABS_WITHOUT_RECORDING, desk)
         side = gui.add_panel()
-        self._add(side, SIDE_TABS, desk)
+        self._add(side, SIDE_TABS if is_usual else SIDE_TABS_WITHOUT_RECORDING, desk)
         side.dock_left()
         side.set_width(SIDE_WIDTH_PX)
         self.handles: Sequence[Any] = (gui.main_panel, side)

@@ -31,10 +31,13 @@ class HistoryPanel:
         self._undo = gui.add_button("Undo the last step", hint="Ctrl+Z, in every tab.", color="gray")
         self._redo = gui.add_button("Redo", hint="Ctrl+Shift+Z or Ctrl+Y, in every tab.", color="gray")
         self._list = gui.add_html("")
+        undo = gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl", icon=None)
+        redo = gui.add_command("Redo", hotkey="Y", modifier="cmd/ctrl", icon=None)
         again = gui.add_command("Redo the step", hotkey="Z", modifier="cmd/ctrl+shift", icon=None)
         widgets.on_user(self._undo, lambda _: dispatch(Undo()), event="on_click")
         widgets.on_user(self._redo, lambda _: dispatch(Redo()), event="on_click")
-        widgets.on_user(again, lambda _: dispatch(Redo()), event="on_trigger")
+        for command, action in ((undo, Undo()), (redo, Redo()), (again, Redo())):
+            widgets.on_user(command, lambda _, action=action: dispatch(action), event="on_trigger")  # type: ignore[misc]
 
     def render(self, state: AppState) -> None:
         """Show the state's steps."""

@@ -60,10 +60,6 @@ class KeypointPanel:
             lambda event: dispatch(Undo() if event.target.value == "Undo" else Redo()),
             event="on_click",
         )
-        undo = gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl", icon=None)
-        redo = gui.add_command("Redo", hotkey="Y", modifier="cmd/ctrl", icon=None)
-        widgets.on_user(undo, lambda _: dispatch(Undo()), event="on_trigger")
-        widgets.on_user(redo, lambda _: dispatch(Redo()), event="on_trigger")
 
     def render(self, state: AppState) -> None:
         """Show the state's pairs."""

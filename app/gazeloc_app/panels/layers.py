@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -34,19 +34,27 @@ _SAME_STROKE_S = 1.5
 """A colour field sends a colour at every movement of the pointer; a rest of so long begins a new step."""
 _NAMED = (Layer.TRUTH, Layer.ESTIMATE, Layer.PHONE)
 """Whose colours have words in `palette.Cameras.words`."""
+OF_THE_ROOM = (Layer.SCAN, Layer.SCAN_TAGS, Layer.PHONE, Layer.GRID, Layer.PEOPLE)
+"""Those that show something in a project without a recording."""
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
 
 
 class LayerPanel:
     """A checkbox per layer; one colour field for the layer that is to be tinted."""
 
-    def __init__(self, gui: GuiApi, dispatch: Callable[[Action], None], facts: Callable[[AppState], tuple[str, ...]]):
+    def __init__(
+        self,
+        gui: GuiApi,
+        dispatch: Callable[[Action], None],
+        facts: Callable[[AppState], tuple[str, ...]],
+        layers: Sequence[Layer] = tuple(Layer),
+    ):
         """`facts(state)` are sentences about what is drawn with less than there is."""
         self._facts, self._dispatch = facts, dispatch
         self._stroke, self._pulled_s = 0, 0.0
         self._puller: object = None
         self._boxes = {}
-        for layer in Layer:
+        for layer in layers:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=_hint(layer, USUAL))
             widgets.on_user(box, partial(_show, dispatch, layer))
             self._boxes[layer] = box
@@ -59,7 +67,7 @@ class LayerPanel:
         self._note = gui.add_html("")
         with gui.add_folder("Tint", expand_by_default=False):
             self._which = gui.add_dropdown(
-                "Layer", tuple(layer.value for layer in TINTABLE), hint="What the colour is for."
+                "Layer", tuple(layer.value for layer in TINTABLE if layer in layers), hint="What the colour is for."
             )
             self._color = gui.add_rgb("Colour", (255, 160, 60), hint="Instead of the layer's own colours.")
             self._own = gui.add_button("Own colours", hint="Take the tint away.")
