@@ -49,7 +49,9 @@ class TagCorners:
     """T tags in one frame (`scan` in metres, or `sfm`): `tag_id` (T,), `corners` (T, 4, 3), what they rest on.
 
     `sightings` (T,) is how many frames were used, `spread` (T,) the RMS disagreement of the sightings,
-    in the frame's units. `notes` are sentences for the user about tags that were left out.
+    in the frame's units. `free_side` (T,) is the side that the sightings say where the printed size is not assumed,
+    NaN where nobody asked: `corners` on the scan are of the printed size, whatever the scan's scale. `notes` are
+    sentences for the user about tags that were left out.
     """
 
     tag_id: Ints
@@ -57,15 +59,27 @@ class TagCorners:
     sightings: Ints
     spread: Floats
     notes: tuple[str, ...] = ()
+    free_side: Floats | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tag_id", frozen(self.tag_id, np.int64))
+        free_side = np.full(len(self.tag_id), np.nan) if self.free_side is None else self.free_side
+        object.__setattr__(self, "free_side", frozen(free_side))
         object.__setattr__(self, "corners", frozen(np.reshape(self.corners, (-1, 4, 3))))
         object.__setattr__(self, "sightings", frozen(self.sightings, np.int64))
         object.__setattr__(self, "spread", frozen(self.spread))
 
     def __len__(self) -> int:
         return len(self.tag_id)
+
+    def free_scale(self, size: float) -> float | None:
+        """How large the tags come out where their printed `size` is not assumed, 1 for just as large; None: unknown.
+
+        The median of the tags that say so.
+        """
+        sides = np.asarray(self.free_side)
+        sides = sides[np.isfinite(sides)]
+        return float(np.median(sides)) / size if len(sides) else None
 
     @property
     def centers(self) -> Floats:

@@ -41,6 +41,8 @@ class AlignOptions:
 
     tag_size_m: float | None = None
     """Known size of the tags between the detector's corners, in metres, to check the scale with; none: no check."""
+    scan_tag_scale: float | None = None
+    """Size of the scan's tags by that of the known one, measured without assuming it (`TagCorners.free_scale`)."""
     robust: RobustOptions = field(default_factory=RobustOptions)
     """How wrong pairs are found."""
     verdicts: VerdictOptions = field(default_factory=VerdictOptions)
@@ -153,6 +155,7 @@ def align(pairs: Correspondences, options: AlignOptions | None = None, *, model:
         is_fitted=True,
         is_contradictory=fit.is_contradictory,
         tag_size_m=options.tag_size_m,
+        scan_tag_scale=options.scan_tag_scale,
         model=model,
     )
     return Alignment.of(fit.scan_from_sfm, AlignmentMethod.KEYPOINTS, _with_verdicts(evidence, pairs, options))
@@ -176,6 +179,7 @@ def judge(
         is_fitted=False,
         is_contradictory=False,
         tag_size_m=options.tag_size_m,
+        scan_tag_scale=options.scan_tag_scale,
         model=model,
     )
     return Alignment.of(scan_from_sfm, method, _with_verdicts(evidence, pairs, options), parent)

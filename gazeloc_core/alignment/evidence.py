@@ -66,7 +66,8 @@ class Evidence:
     """Everything that was measured about one alignment, and the verdicts on it.
 
     `is_fitted`: the alignment was fitted to these keypoints, so their residuals flatter it. `tag_scale` is the size of
-    the reconstruction's tags under the alignment divided by the known size, `scan_tag_scale` that of the scan's tags.
+    the reconstruction's tags under the alignment divided by the known size, `scan_tag_scale` that of the scan's tags,
+    measured without assuming the size.
     """
 
     keypoints: tuple[KeypointEvidence, ...]
@@ -132,9 +133,13 @@ def measure(
     is_fitted: bool,
     is_contradictory: bool,
     tag_size_m: float | None,
+    scan_tag_scale: float | None,
     model: SfmModel | None,
 ) -> Evidence:
-    """The evidence on an alignment at K pairs, of which `inlier` (K,) agree, without verdicts yet."""
+    """The evidence on an alignment at K pairs, of which `inlier` (K,) agree, without verdicts yet.
+
+    `scan_tag_scale` must come from elsewhere: tags on the scan are made squares of the known size.
+    """
     distance = residuals(scan_from_sfm, pairs)
     pixels = np.full(len(pairs), np.nan) if model is None else reprojection_px(scan_from_sfm, pairs, model)
     left_out = leave_one_out(pairs, inlier).residuals() if is_fitted else np.full(len(pairs), np.nan)
@@ -155,7 +160,7 @@ def measure(
         is_fitted=is_fitted,
         is_contradictory=is_contradictory,
         tag_scale=_tag_scale(pairs.sfm * scan_from_sfm.scale, pairs, tag_size_m),
-        scan_tag_scale=_tag_scale(pairs.scan, pairs, tag_size_m),
+        scan_tag_scale=scan_tag_scale,
     )
 
 

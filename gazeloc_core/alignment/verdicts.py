@@ -170,16 +170,21 @@ def _on_geometry(geometry: GeometryEvidence, options: VerdictOptions) -> list[Ve
 
 
 def _on_tag_size(evidence: Evidence, options: VerdictOptions) -> list[Verdict]:
-    if evidence.tag_scale is None or evidence.scan_tag_scale is None:
+    ours, scan = evidence.tag_scale, evidence.scan_tag_scale
+    if ours is None:
         return []
-    ours, scan = abs(evidence.tag_scale - 1), abs(evidence.scan_tag_scale - 1)
-    level = _level(max(ours, scan), options.good_scale, options.bad_scale)
-    text = f"Tags come out at {evidence.tag_scale:.1%} of the given size in the aligned reconstruction"
-    text += f" and at {evidence.scan_tag_scale:.1%} on the scan."
-    if level != "good":
-        both = min(ours, scan) > options.good_scale
-        text += " Check the tag size" + (" and the unit of the scan." if both else " and the worst keypoints.")
-    return [Verdict(level, text)]
+    off = max(abs(scale - 1) for scale in (ours, scan) if scale is not None)
+    level = _level(off, options.good_scale, options.bad_scale)
+    text = f"Tags come out at {ours:.1%} of the given size in the aligned reconstruction"
+    text += "." if scan is None else f" and at {scan:.1%} on the scan."
+    if level == "good":
+        return [Verdict(level, text)]
+    if scan is not None and abs(ours - scan) <= options.good_scale:
+        size = "large" if ours > 1 else "small"
+        return [
+            Verdict(level, f"{text} Measure a tag: if its size was given right, the scan is too {size} by as much.")
+        ]
+    return [Verdict(level, f"{text} Check the tag size and the worst keypoints.")]
 
 
 def _members(evidence: Evidence, group: str) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, AlignOptions, judge
+from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, judge
 from gazeloc_core.alignment.paper_keypoints import scan_tag_centers, sfm_tag_centers
 from gazeloc_core.localize.global_ import GlobalOptions, GlobalRegistration, align_global
 from gazeloc_core.localize.sfm_paper import AlignPaperOptions, PaperAlignment, align_paper
@@ -18,7 +18,7 @@ from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
-from gazeloc_core.stages.registration import correspondences
+from gazeloc_core.stages.registration import align_options, correspondences
 from gazeloc_core.storage.files import read_json, write_json_atomically
 from gazeloc_core.surfaces.meshing import delaunay_surface, poisson_surface
 
@@ -39,7 +39,7 @@ def align_sfm_paper(
     project: Project, recording: str, options: AlignPaperOptions | None = None, report: Report = silent
 ) -> PaperAlignment:
     """Align the reconstruction by the tags' centres and point-to-point ICP, as in the paper's figure 10."""
-    options = options or AlignPaperOptions(align=_judging(project))
+    options = options or AlignPaperOptions(align=align_options(project))
     model = inputs.load_model(project, recording)
     report(0.0, "tag centres by the paper's recipe")
     on_scan = scan_tag_centers(
@@ -93,7 +93,7 @@ def align_globally(
     alignment = judge(
         found.scan_from_sfm,
         correspondences(project, recording),
-        _judging(project),
+        align_options(project),
         method=AlignmentMethod.SHAPE,
         model=model,
     )
@@ -129,11 +129,6 @@ def method_alignment(project: Project, recording: str, method: Method) -> Alignm
     artifact = project.result(recording, method, "alignment")
     artifact.header()
     return Alignment.from_json(read_json(artifact.folder / _FILE, "an alignment")["alignment"])
-
-
-def _judging(project: Project) -> AlignOptions:
-    tags = project.settings.tags
-    return AlignOptions(tag_size_m=tags.size_m if tags else None)
 
 
 def _write(

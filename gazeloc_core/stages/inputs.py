@@ -92,7 +92,8 @@ def load_sightings(arrays: dict[str, Any]) -> TagSightings:
 
 def load_corners(arrays: dict[str, Any]) -> TagCorners:
     """The corners of an artifact."""
-    return TagCorners(arrays["tag_id"], arrays["corners"], arrays["sightings"], arrays["spread"])
+    columns = (arrays["tag_id"], arrays["corners"], arrays["sightings"], arrays["spread"])
+    return TagCorners(*columns, free_side=arrays.get("free_side"))
 
 
 def sightings_arrays(sightings: TagSightings) -> dict[str, Any]:
@@ -112,6 +113,7 @@ def corners_arrays(corners: TagCorners) -> dict[str, Any]:
         "corners": corners.corners,
         "sightings": corners.sightings,
         "spread": corners.spread,
+        "free_side": corners.free_side,
     }
 
 

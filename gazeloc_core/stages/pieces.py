@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from gazeloc_core.alignment.alignment import Alignment, AlignOptions
+from gazeloc_core.alignment.alignment import Alignment
 from gazeloc_core.bending.pieces import Piece, PieceOptions, place_pieces
 from gazeloc_core.errors import ProjectError
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.sfm_model import PlacedModel
 from gazeloc_core.stages import inputs
+from gazeloc_core.stages.registration import align_options
 from gazeloc_core.stages.tracking import load_tracked
 from gazeloc_core.storage.files import read_json, write_json_atomically
 
@@ -22,7 +23,7 @@ def align_pieces(
 ) -> tuple[Piece, ...]:
     """Align each piece beside the largest by its own evidence."""
     tags = project.settings.tags
-    options = options or PieceOptions(align=AlignOptions(tag_size_m=tags.size_m if tags else None))
+    options = options or PieceOptions(align=align_options(project))
     report(0.1, "placing the smaller pieces")
     sightings = corners = None
     if tags is not None:

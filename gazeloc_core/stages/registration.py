@@ -96,9 +96,15 @@ def _why_no_keypoints(project: Project, recording: str) -> str:
 
 
 def align_options(project: Project) -> AlignOptions:
-    """How a project's keypoints are aligned: with the known size of its tags."""
+    """How a project's keypoints are aligned: with the known size of its tags, and what they measure on the scan."""
     tags = project.settings.tags
-    return AlignOptions(tag_size_m=tags.size_m if tags else None)
+    if tags is None or tags.size_m is None:
+        return AlignOptions()
+    artifact = project.scan_artifact("corners")
+    corners = inputs.load_corners(artifact.read_arrays()) if artifact.exists else None
+    return AlignOptions(
+        tag_size_m=tags.size_m, scan_tag_scale=None if corners is None else corners.free_scale(tags.size_m)
+    )
 
 
 def alignment_inputs(project: Project, recording: str) -> dict[str, str]:

@@ -25,7 +25,7 @@ from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.tags.bundle import TagBundleOptions, TagScene, adjust_tags
-from gazeloc_core.tags.square import fit_plane, fit_square, inside_of_tag_px
+from gazeloc_core.tags.square import fit_plane, fit_square, inside_of_tag_px, side_of
 from gazeloc_core.triangulation import (
     Observations,
     TriangulatedPoints,
@@ -233,7 +233,7 @@ def triangulate_sfm_corners(
         else:
             scale = np.median(distance[mine & answer.is_used]) / float(camera.focal_px.mean())
             spread = float(np.sqrt(np.mean(answer.rms_px[four] ** 2)) * scale)
-            found[tag_id] = _Tag(answer.points[four], views, spread)
+            found[tag_id] = _Tag(answer.points[four], views, spread, side_of(fit_square(answer.points[four], None)))
     return _columns(found, notes)
 
 
@@ -241,6 +241,7 @@ class _Tag(NamedTuple):
     corners: Floats
     sightings: int
     spread: float
+    free_side: float
 
 
 def _columns(found: dict[int, _Tag], notes: list[str]) -> TagCorners:
@@ -250,6 +251,7 @@ def _columns(found: dict[int, _Tag], notes: list[str]) -> TagCorners:
         np.array([tag.sightings for tag in found.values()], dtype=np.int64),
         np.array([tag.spread for tag in found.values()], dtype=np.float64),
         tuple(notes),
+        np.array([tag.free_side for tag in found.values()], dtype=np.float64),
     )
 
 
@@ -335,15 +337,17 @@ def _place(
     if len(places) == 0:
         if rays is None:
             return "is seen, but neither meets the mesh nor is determined by its rays; left out"
-        corners = fit_square(rays[0], tag_size_m)
-        return _Tag(corners, ray_views, float(np.sqrt(np.trace(rays[1], axis1=1, axis2=2).mean())))
+        spread = float(np.sqrt(np.trace(rays[1], axis1=1, axis2=2).mean()))
+        return _Tag(fit_square(rays[0], tag_size_m), ray_views, spread, side_of(fit_square(rays[0], None)))
     agree = _largest_group(places.mean(axis=1), options.agree_m)
     others = places[~agree].mean(axis=1)
     if (~agree).mean() > _SPLIT_SHARE and _largest_group(others, options.agree_m).sum() >= 2:
         return _IN_TWO_PLACES
     mean, variance = _robust_mean(places[agree], sigma[agree], options)
-    corners = fit_square(mean if rays is None else _joined(mean, variance, *rays, options), tag_size_m)
-    return _Tag(corners, int(agree.sum()), _spread(places[agree], sigma[agree], corners, options))
+    joined = mean if rays is None else _joined(mean, variance, *rays, options)
+    corners = fit_square(joined, tag_size_m)
+    spread = _spread(places[agree], sigma[agree], corners, options)
+    return _Tag(corners, int(agree.sum()), spread, side_of(fit_square(joined, None)))
 
 
 def _spread(places: Floats, sigma: Floats, corners: Floats, options: ScanCornerOptions) -> float:

@@ -61,3 +61,8 @@ def fit_square(corners: Floats, side: float | None) -> Floats:
     turned = ideal @ rotation_of_square(corners).T
     scale = side if side is not None else float(((corners - middle) * turned).sum() / (ideal**2).sum())
     return np.asarray(scale * turned + middle)
+
+
+def side_of(square: Floats) -> float:
+    """The side of a square (4, 3)."""
+    return float(np.linalg.norm(square[1] - square[0]))

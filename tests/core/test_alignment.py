@@ -236,6 +236,21 @@ def test_tag_size_checks_the_scale(given_size_m, level):
     assert "Tags come out" in texts(alignment, level)
 
 
+@pytest.mark.parametrize(
+    ("on_scan", "level", "said"),
+    [
+        (0.8, "bad", "the scan is too small by as much"),
+        (1.0, "bad", "Check the tag size and the worst keypoints"),
+        (None, "bad", "Check the tag size and the worst keypoints"),
+    ],
+)
+def test_a_scan_of_another_scale_is_told_from_wrong_keypoints(on_scan, level, said):
+    room = make_room(points=500)
+    alignment = align(room.pairs, AlignOptions(tag_size_m=TAG_SIZE_M / 0.8, scan_tag_scale=on_scan))
+    assert said in texts(alignment, level)
+    assert ("on the scan" in texts(alignment, level)) == (on_scan is not None)
+
+
 def test_residual_in_pixels_is_that_of_the_images_in_view():
     room = make_room(points=500)
     pairs = clicked(CORNERS_OF_ROOM[4:5])

@@ -10,6 +10,7 @@ from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.scan import Mesh, RoomScan, ScanFrame
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.stages import inputs
 from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagSightings
 from gazeloc_core.tags.corners import map_scan_corners, triangulate_sfm_corners
@@ -95,6 +96,26 @@ def test_drift_and_a_bumpy_mesh_leave_a_centimetre(size: float | None, bound_m: 
     assert worst_error(answer, TAGS) < bound_m
     assert (answer.spread > 0.005).all()  # the drift is reported, not hidden
     assert (answer.spread < 0.03).all()
+
+
+@pytest.mark.parametrize("scan_scale", [0.9, 1.0, 1.03])
+def test_the_scale_of_the_scan_shows_in_its_tags_though_they_are_drawn_as_printed(scan_scale: float) -> None:
+    poses, mesh = phone_poses(6), wall().mesh
+    in_scan = RigidTransform.from_components(scan_scale * poses.translation, poses.rotation)
+    scaled = Raycaster(Mesh(scan_scale * mesh.vertices, mesh.faces))
+    answer = map_scan_corners(scan_of(scaled, in_scan), scaled, sight(poses, TAGS), tag_size_m=SIZE_M)
+    sides = np.linalg.norm(answer.corners - np.roll(answer.corners, 1, axis=1), axis=2)
+    np.testing.assert_allclose(sides, SIZE_M, rtol=1e-6)
+    assert answer.free_scale(SIZE_M) == pytest.approx(scan_scale, abs=1e-3)
+    kept = inputs.load_corners(inputs.corners_arrays(answer))
+    assert kept.free_scale(SIZE_M) == answer.free_scale(SIZE_M)
+
+
+def test_tags_of_before_do_not_say_the_scale_of_the_scan() -> None:
+    poses, mesh = phone_poses(2), wall()
+    columns = inputs.corners_arrays(map_scan_corners(scan_of(mesh, poses), mesh, sight(poses, TAGS)))
+    del columns["free_side"]
+    assert inputs.load_corners(columns).free_scale(SIZE_M) is None
 
 
 def test_a_tag_seen_once_counts_and_admits_its_uncertainty() -> None:
