@@ -27,12 +27,13 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.places import RemoveView, SaveView
-from gazeloc_app.actions.views import TintLayer
+from gazeloc_app.actions.views import ColorCameras, CompareWith, ShowLayer, ThinCameras, TintLayer
+from gazeloc_app.annotation.annotation_json import changes_to_json
 from gazeloc_app.annotation.history import History
 from gazeloc_app.annotation.room_saving import RoomSaver
-from gazeloc_app.annotation.saving import Saver, annotation_in_files
+from gazeloc_app.annotation.saving import IN_THE_JOURNAL, Saver, annotation_in_files
 from gazeloc_app.app import App
-from gazeloc_app.state import Annotation, AppState, Layer
+from gazeloc_app.state import ABOUT_THE_ROOM, Annotation, AppState, Coloring, Layer
 from viser import _messages
 
 from gazeloc_core.methods import Method
@@ -90,7 +91,9 @@ def check_end(folder: Path, outcome: Outcome, allowed: set[str] | None = None) -
         room = saver.room_after_a_kill(RoomSaver(folder).read())
         saver.commit(state, state)
         saver.settle(state, state)
-        in_files = replace(annotation_in_files(project, "walk"), views=room.views, tints=room.tints)
+        elsewhere = {name: getattr(room, name) for name in ABOUT_THE_ROOM}
+        elsewhere |= {name: getattr(history.present, name) for name in IN_THE_JOURNAL}
+        in_files = replace(annotation_in_files(project, "walk"), **elsewhere)
         if in_files != history.present:
             outcome.lost.append("the project's files differ from the history")
     outcome.steps = len(history.annotations)
@@ -140,7 +143,8 @@ class Digests:
     def _of(self, annotation: Annotation) -> str:
         known = self._known.get(id(annotation))
         if known is None:
-            digest = hashlib.sha256(repr(annotation).encode()).hexdigest()
+            content = json.dumps(changes_to_json(Annotation(), annotation))  # the order of sets differs by process
+            digest = hashlib.sha256(content.encode()).hexdigest()
             known = self._known[id(annotation)] = (annotation, digest)
         return known[1]
 
@@ -186,7 +190,10 @@ def _about_the_room(rng: random.Random) -> Action:
     name = f"view {rng.randrange(4)}"
     view = SavedView(name, (rng.uniform(0, 4), 1.0, 1.5), (2.0, 1.0, 1.0))
     color = (rng.randrange(256), 80, 200)
-    return rng.choice([SaveView(view), RemoveView(name), TintLayer(Layer.SCAN, rng.choice([None, color]))])
+    shown = [ShowLayer(rng.choice(list(Layer)), rng.random() < 0.5), ColorCameras(rng.choice(list(Coloring)))]
+    shown += [ThinCameras(rng.choice([None, 1, 5])), CompareWith(rng.choice(["", "tags"]))]
+    tinted = TintLayer(Layer.SCAN, rng.choice([None, color]))
+    return rng.choice([SaveView(view), RemoveView(name), tinted, rng.choice(shown)])
 
 
 def _use_widget(app: App, rng: random.Random, client_id: int) -> None:

@@ -115,6 +115,30 @@ class Person:
 
 
 @dataclass(frozen=True)
+class LayerSettings:
+    """Which layers show, how, and what shows beside them: one scene for all browsers, so decided together."""
+
+    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS, Layer.GRID})
+    coloring: Coloring = Coloring.SET
+    thinning: int | None = None
+    """Every how many of the recording's cameras one is drawn; None leaves it to their number."""
+    compared: frozenset[Method] = frozenset()
+    """Methods whose poses show in the scene beside those of the method that was chosen."""
+    draws_tags: bool = False
+    """Whether the tags that were found are drawn into the frame."""
+    suggests: bool = True
+    """Whether the next best place for a keypoint is shown."""
+
+    def is_visible(self, layer: Layer) -> bool:
+        """Whether a layer shows."""
+        return layer not in self.hidden
+
+    def with_visible(self, layer: Layer, is_visible: bool) -> LayerSettings:
+        """With one layer shown or hidden."""
+        return replace(self, hidden=self.hidden - {layer} if is_visible else self.hidden | {layer})
+
+
+@dataclass(frozen=True)
 class Annotation:
     """What people decide, and what undo and redo step through."""
 
@@ -130,6 +154,12 @@ class Annotation:
     """Places to look at the room from; about the room, so the same in all recordings."""
     tints: tuple[tuple[Layer, Rgb], ...] = ()
     """Layers' colours in place of their own; the same in all recordings."""
+    layers: LayerSettings = field(default_factory=LayerSettings)
+    """What shows in the scene; the same in all recordings."""
+    is_live: bool = True
+    """Whether people want the alignment to follow the keypoints (see `live_alignment.is_following`)."""
+    compared_with: str = ""
+    """Whose render shows beside that of the poses that are shown: an alignment's key, a method, or "" for none."""
 
     def tint(self, layer: Layer) -> Rgb | None:
         """A layer's tint, None for its own colours."""
@@ -157,31 +187,13 @@ class SuggestedAlignment:
     by_person: bool
 
 
-ABOUT_THE_ROOM = ("views", "tints")
+ABOUT_THE_ROOM = ("views", "tints", "layers")
 """The fields of `Annotation` that are the same in all recordings."""
 
 
-@dataclass(frozen=True)
-class LayerSettings:
-    """Which layers show, and what colours stand for."""
-
-    hidden: frozenset[Layer] = frozenset({Layer.TAG_POINTS, Layer.ERRORS, Layer.GRID})
-    coloring: Coloring = Coloring.SET
-    are_colors_safe: bool = False
-    """Whether the sets of cameras have the colours for colour-blind eyes."""
-    thinning: int | None = None
-    """Every how many of the recording's cameras one is drawn; None leaves it to their number."""
-
-    def is_visible(self, layer: Layer) -> bool:
-        """Whether a layer shows."""
-        return layer not in self.hidden
-
-    def with_visible(self, layer: Layer, is_visible: bool) -> LayerSettings:
-        """With one layer shown or hidden."""
-        return replace(self, hidden=self.hidden - {layer} if is_visible else self.hidden | {layer})
-
-
 MAX_UNDO = 500
+Stroke = tuple[str, int]
+"""What is pulled at, and a number that tells one pull from the next."""
 
 
 @dataclass(frozen=True)
@@ -196,26 +208,17 @@ class AppState:
     future: tuple[Annotation, ...] = ()
     selected_key: str | None = None
     frame: int = 0
-    layers: LayerSettings = field(default_factory=LayerSettings)
-    compared: frozenset[Method] = frozenset()
-    """Methods whose poses show in the scene beside those of the method that was chosen."""
-    is_live: bool = True
-    """Whether people want the alignment to follow the keypoints (see `live_alignment.is_following`)."""
+    are_colors_safe: bool = False
+    """Whether the sets of cameras have the colours for colour-blind eyes."""
     live_asked: int = 0
     """Counts how often a person switched that on, which fits the keypoints at once."""
     fit_note: str = ""
     """Why the last change of the keypoints gave no alignment; "" where it did."""
-    suggests: bool = True
-    """Whether the next best place for a keypoint is shown."""
-    stroke: tuple[int, Annotation] | None = None
-    """The last pull at a colour field, and what it led to: it goes on as the same step while nothing else happens."""
+    stroke: tuple[Stroke, Annotation] | None = None
+    """The last pull at a widget, and what it led to: it goes on as the same step while nothing else happens."""
     is_playing: bool = False
     speed: float = 1.0
     """How many seconds of the recording pass in a second of playing."""
-    compared_with: str = ""
-    """Whose render shows beside that of the poses that are shown: an alignment's key, a method, or "" for none."""
-    draws_tags: bool = False
-    """Whether the tags that were found are drawn into the frame."""
     job: Job | None = None
     waiting_jobs: tuple[Job, ...] = ()
     """Asked for while `job` runs; they follow one after the other."""
@@ -235,9 +238,14 @@ class AppState:
     """What to say about the renderer of pictures where it stands in for the usual one."""
 
     @property
+    def layers(self) -> LayerSettings:
+        """What shows in the scene."""
+        return self.annotation.layers
+
+    @property
     def cameras(self) -> palette.Cameras:
         """The colours of the sets of cameras."""
-        return palette.cameras(are_safe=self.layers.are_colors_safe)
+        return palette.cameras(are_safe=self.are_colors_safe)
 
     @property
     def jobs(self) -> tuple[Job, ...]:
@@ -257,6 +265,18 @@ class AppState:
         if annotation == self.annotation:
             return self
         return replace(self, annotation=annotation, past=(*self.past, self.annotation)[-MAX_UNDO:], future=())
+
+    def annotate_in_stroke(self, annotation: Annotation, stroke: Stroke) -> AppState:
+        """`annotate`, where all values of one pull at a widget are one step; number 0 is a step of its own."""
+        goes_on = self.stroke is not None and self.stroke[0] == stroke and self.stroke[1] is self.annotation
+        if goes_on and stroke[1]:
+            return replace(self, annotation=annotation, stroke=(stroke, annotation))
+        state = self.annotate(annotation)
+        return replace(state, stroke=(stroke, state.annotation)) if stroke[1] and state is not self else state
+
+    def with_layers(self, **changes: Any) -> AppState:
+        """`annotate` with only these fields of what shows changed."""
+        return self.annotate(replace(self.annotation, layers=replace(self.layers, **changes)))
 
     def with_keypoints(self, keypoints: KeypointSet) -> AppState:
         """`annotate` with only the keypoints changed."""

@@ -31,7 +31,7 @@ class UserSettings:
 
     def put_into(self, state: AppState) -> AppState:
         """The state with the user's settings."""
-        return replace(state, layers=replace(state.layers, are_colors_safe=self._read()))
+        return replace(state, are_colors_safe=self._read())
 
     def save(self, before: AppState, after: AppState) -> None:
         """Write them where they changed.
@@ -39,8 +39,8 @@ class UserSettings:
         Raises:
             GazelocError: if that fails.
         """
-        is_on = after.layers.are_colors_safe
-        if is_on == before.layers.are_colors_safe:
+        is_on = after.are_colors_safe
+        if is_on == before.are_colors_safe:
             return
         path = settings_path()
         try:

@@ -4,18 +4,20 @@ from dataclasses import fields, replace
 
 import pytest
 from gazeloc_app import state as state_module
-from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod
+from gazeloc_app.actions.choices import ChooseAlignment, ChooseMethod, CompareMethod
 from gazeloc_app.actions.history import Redo, Undo
+from gazeloc_app.actions.live import FollowKeypoints
 from gazeloc_app.actions.marks import MarkFrame, NoteFrame
 from gazeloc_app.actions.pairs import DeletePair, EnablePair, RenamePair
 from gazeloc_app.actions.picks import PickPoint, PickSighting, Side
 from gazeloc_app.actions.places import RemoveView, RenameView, SaveView
-from gazeloc_app.actions.views import TintLayer
+from gazeloc_app.actions.suggest import ShowSuggestions
+from gazeloc_app.actions.views import ColorCameras, CompareWith, DrawTags, ShowLayer, ThinCameras, TintLayer
 from gazeloc_app.annotation import history as history_module
 from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
 from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
 from gazeloc_app.annotation.steps import describe
-from gazeloc_app.state import Annotation, AppState, Layer
+from gazeloc_app.state import Annotation, AppState, Coloring, Layer, LayerSettings
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -36,6 +38,16 @@ OTHER_VALUES = {  # of every field of Annotation; a new field needs one, and per
     "marks": FrameMarks((FrameMark(3, Mark.BAD, "too far left"),)),
     "views": (SavedView("desk", (1.0, 2.0, 3.0), (0.0, 0.0, 1.0), 0.9),),
     "tints": ((Layer.SCAN, (1, 2, 3)), (Layer.TRUTH, (250, 0, 9))),
+    "layers": LayerSettings(
+        frozenset({Layer.SCAN, Layer.GRID}),
+        Coloring.ERROR,
+        7,
+        frozenset({Method.TAGS}),
+        draws_tags=True,
+        suggests=False,
+    ),
+    "is_live": False,
+    "compared_with": "tags",
 }
 DESK, DOOR = SavedView("desk", (1, 2, 3), (0, 0, 1)), SavedView("door", (3, 2, 1), (0, 0, 1))
 COLORS = st.none() | st.tuples(*[st.integers(0, 255)] * 3)
@@ -84,7 +96,7 @@ def test_a_step_writes_only_what_it_changed():
     clicked = PickPoint(Side.SCAN, (1, 2, 3)).apply(state)
     chosen = ChooseAlignment("abc").apply(clicked)
     (line,) = lines_between(History.of(clicked), History.of(chosen))
-    assert line["step"] == {"alignment": "abc", "alignment_by_person": True}
+    assert line["step"] == {"alignment": "abc", "alignment_by_person": True, "is_live": False}
     assert lines_between(History.of(chosen), History.of(Undo().apply(chosen))) == [{"go": 1}]
     assert lines_between(History.of(chosen), History.of(chosen)) == []
 
@@ -137,6 +149,17 @@ def test_garbled_lines_are_refused(lines):
         ([SaveView(DESK), SaveView(replace(DESK, eye=(9, 9, 9)))], "View “desk” saved anew"),
         ([SaveView(DESK), RenameView("desk", "table")], "View “desk” renamed to “table”"),
         ([SaveView(DESK), SaveView(DOOR), RemoveView("desk")], "View “desk” removed"),
+        ([ShowLayer(Layer.SCAN, False)], "Scan hidden"),
+        ([ShowLayer(Layer.GRID, True)], "Grid shown"),
+        ([ColorCameras(Coloring.ERROR)], "Cameras coloured by error"),
+        ([ThinCameras(5)], "One camera in 5 drawn"),
+        ([ThinCameras(5), ThinCameras(None)], "As many cameras drawn as fit"),
+        ([CompareMethod(Method.TAGS, True)], "tags shown for comparison"),
+        ([CompareMethod(Method.TAGS, True), CompareMethod(Method.TAGS, False)], "tags no longer compared"),
+        ([CompareWith("tags")], "Renders compared with tags"),
+        ([DrawTags(True)], "Tags drawn into frames"),
+        ([ShowSuggestions(False)], "Next best place hidden"),
+        ([FollowKeypoints(False)], "Alignment no longer follows the keypoints"),
         ([TintLayer(Layer.SCAN, (1, 2, 3))], "Colour of Scan changed"),
         ([TintLayer(Layer.SCAN, (1, 2, 3)), TintLayer(Layer.SCAN, None)], "Colour of Scan put back to its own"),
     ],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from app_project import true_poses
 from app_steps import step, wait_for_job
@@ -93,8 +95,8 @@ def test_a_method_that_cannot_run_is_a_sentence(app, project):
 def test_drawing_tags_changes_the_frames_url_only(app):
     before = app.store.state
     step(app, DrawTags(True))
-    assert app.store.state.draws_tags
-    assert app.store.state.annotation == before.annotation
+    assert app.store.state.layers.draws_tags
+    assert app.store.state.annotation == replace(before.annotation, layers=app.store.state.layers)
 
 
 def test_the_frame_says_what_a_pose_by_tags_rests_on(app, project):

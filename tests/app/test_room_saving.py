@@ -6,11 +6,11 @@ import pytest
 from app_project import make_app_project
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.places import RemoveView, SaveView
-from gazeloc_app.actions.views import TintLayer
+from gazeloc_app.actions.views import ShowLayer, TintLayer
 from gazeloc_app.annotation.history import History
 from gazeloc_app.annotation.room_saving import RoomSaver
 from gazeloc_app.annotation.saving import Saver
-from gazeloc_app.state import AppState, Layer
+from gazeloc_app.state import ABOUT_THE_ROOM, AppState, Layer
 
 from gazeloc_core.surfaces.saved_views import SavedView
 
@@ -44,7 +44,10 @@ def project(tmp_path):
 
 
 @pytest.mark.parametrize("writes", [0, 1, 2, 3])
-@pytest.mark.parametrize("last", [SaveView(CORNER), RemoveView("old"), Undo(), TintLayer(Layer.SCAN, (1, 2, 3))])
+@pytest.mark.parametrize(
+    "last",
+    [SaveView(CORNER), RemoveView("old"), Undo(), TintLayer(Layer.SCAN, (1, 2, 3)), ShowLayer(Layer.SCAN, False)],
+)
 def test_one_step_is_whole_or_not_at_all(project, last, writes):
     old = replace(CORNER, name="old")
     life = Life(project).act(TintLayer(Layer.SCAN, (9, 9, 9))).act(SaveView(old))
@@ -55,7 +58,8 @@ def test_one_step_is_whole_or_not_at_all(project, last, writes):
     again.act(Redo())
     assert Life(project).state.annotation == again.state.annotation
     room = RoomSaver(project.folder).read()
-    assert (room.views, room.tints) == (again.state.annotation.views, again.state.annotation.tints)
+    for name in ABOUT_THE_ROOM:
+        assert getattr(room, name) == getattr(again.state.annotation, name)
 
 
 @pytest.mark.parametrize("writes", [1, 2, 3])

@@ -18,8 +18,9 @@ class ChooseAlignment:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        state = replace(state, is_live=self.key is None, fit_note="")  # what is chosen stays, whatever is clicked next
-        return state.annotate(replace(state.annotation, alignment=self.key, alignment_by_person=self.key is not None))
+        by_person = self.key is not None
+        chosen = replace(state.annotation, alignment=self.key, alignment_by_person=by_person, is_live=not by_person)
+        return replace(state, fit_note="").annotate(chosen)  # what is chosen stays, whatever is clicked next
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class CompareMethod:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        compared = state.compared | {self.method} if self.is_shown else state.compared - {self.method}
-        return replace(state, compared=compared)
+        others = state.layers.compared - {self.method}
+        return state.with_layers(compared=others | {self.method} if self.is_shown else others)
 
 
 @dataclass(frozen=True)
@@ -58,20 +59,15 @@ class OpenRecording:
         if self.recording == state.recording:
             return state
         opened = replace(
-            self.history().with_room_of(state.annotation).put_into(AppState(state.recordings, self.recording)),
-            layers=state.layers,
-            compared=state.compared,
-            draws_tags=state.draws_tags,
-            suggests=state.suggests,
-            data_revision=state.data_revision + 1,
-            renderer_note=state.renderer_note,
-            job=state.job,
-            waiting_jobs=state.waiting_jobs,
-            ended_jobs=state.ended_jobs,
+            self.history().with_room_of(state.annotation).put_into(state),
+            recording=self.recording,
+            selected_key=None,
+            frame=0,
+            fit_note="",
+            is_playing=False,
+            notice=None,
             suggested=tuple(other for other in state.suggested if other.recording != self.recording),
-            offered_jobs=state.offered_jobs,
-            jobs_started=state.jobs_started,
-            people=state.people,
+            data_revision=state.data_revision + 1,
         )
         for suggested in state.suggested:
             if suggested.recording == self.recording:

@@ -16,15 +16,16 @@ class FollowKeypoints:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it; switched on, the keypoints are fitted at once (live_alignment.py)."""
-        return replace(state, is_live=self.is_on, live_asked=state.live_asked + int(self.is_on), fit_note="")
+        state = state.annotate(replace(state.annotation, is_live=self.is_on))
+        return replace(state, live_asked=state.live_asked + int(self.is_on), fit_note="")
 
 
 @dataclass(frozen=True)
 class FitFound:
     """The keypoints of a recording were fitted: by the alignment `key`, or by none, and `note` says why.
 
-    `is_step`: a person asked for the fit by itself, so it is a step to undo. Else it is part of the step that changed
-    the keypoints: one undo takes both back.
+    `is_step`: a person asked for the fit by itself, so it is a step to undo, one with that of asking. Else it is part
+    of the step that changed the keypoints: one undo takes both back.
     """
 
     recording: str
@@ -36,10 +37,12 @@ class FitFound:
     def apply(self, state: AppState) -> AppState:
         """The state with the fit in force; an answer to keypoints that have changed since is dropped."""
         asked_for = (self.recording, self.keypoints) == (state.recording, state.annotation.keypoints)
-        if not asked_for or not state.is_live:
+        if not asked_for or not state.annotation.is_live:
             return state
         state = replace(state, fit_note=self.note)
         if self.key is None or self.key == state.annotation.alignment:
             return state
         annotation = replace(state.annotation, alignment=self.key, alignment_by_person=True)
-        return state.annotate(annotation) if self.is_step else replace(state, annotation=annotation)
+        is_asking = bool(state.past) and state.annotation == replace(state.past[-1], is_live=True)
+        is_own = self.is_step and not is_asking
+        return state.annotate(annotation) if is_own else replace(state, annotation=annotation)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from gazeloc_app.state import AppState
 
@@ -15,4 +15,4 @@ class ShowSuggestions:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        return replace(state, suggests=self.is_on)
+        return state.with_layers(suggests=self.is_on)

@@ -51,7 +51,7 @@ class CompareWith:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        return replace(state, compared_with=self.poses)
+        return state.annotate(replace(state.annotation, compared_with=self.poses))
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class DrawTags:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        return replace(state, draws_tags=self.is_on)
+        return state.with_layers(draws_tags=self.is_on)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class ShowLayer:
 
     def apply(self, state: AppState) -> AppState:
         """The state with the layer switched."""
-        return replace(state, layers=state.layers.with_visible(self.layer, self.is_visible))
+        return state.with_layers(hidden=state.layers.with_visible(self.layer, self.is_visible).hidden)
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,7 @@ class TintLayer:
 
     def apply(self, state: AppState) -> AppState:
         """The state with the tint; all colours of one pull are one step."""
-        annotation = state.annotation.with_tint(self.layer, self.tint)
-        goes_on = self.stroke and state.stroke is not None and state.stroke[0] == self.stroke
-        if goes_on and state.stroke is not None and state.stroke[1] is state.annotation:
-            return replace(state, annotation=annotation, stroke=(self.stroke, annotation))
-        state = state.annotate(annotation)
-        return replace(state, stroke=(self.stroke, state.annotation)) if self.stroke else state
+        return state.annotate_in_stroke(state.annotation.with_tint(self.layer, self.tint), ("tint", self.stroke))
 
 
 MAX_THINNING = 100
@@ -104,11 +99,14 @@ class ThinCameras:
     """Every `step`-th camera of the recording shall be drawn; None: as many as leave the room to be seen."""
 
     step: int | None
+    stroke: int = 0
+    """Tells one pull at the slider from the next; 0 for a step of its own."""
 
     def apply(self, state: AppState) -> AppState:
-        """The state with it."""
+        """The state with it; all values of one pull are one step."""
         step = None if self.step is None else min(max(self.step, 1), MAX_THINNING)
-        return replace(state, layers=replace(state.layers, thinning=step))
+        thinned = replace(state.annotation, layers=replace(state.layers, thinning=step))
+        return state.annotate_in_stroke(thinned, ("thinning", self.stroke))
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class ColorCameras:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        return replace(state, layers=replace(state.layers, coloring=self.coloring))
+        return state.with_layers(coloring=self.coloring)
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ class UseSafeColors:
 
     def apply(self, state: AppState) -> AppState:
         """The state with it."""
-        return replace(state, layers=replace(state.layers, are_colors_safe=self.is_on))
+        return replace(state, are_colors_safe=self.is_on)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
+from gazeloc_app.annotation.layers_json import layers_from_json, layers_to_json
 from gazeloc_app.state import Annotation, Layer
 from gazeloc_core.errors import InputError
 from gazeloc_core.frames.marks import FrameMarks
@@ -36,6 +37,7 @@ CODECS: dict[str, Codec] = {
     "marks": (FrameMarks.to_json, FrameMarks.from_json),
     "method": (lambda method: method.value, Method),
     "views": (views_to_json, views_from_json),
+    "layers": (layers_to_json, layers_from_json),
     "tints": (tints_to_json, tints_from_json),
 }
 """To JSON and back, for fields that are not JSON themselves."""
@@ -60,5 +62,5 @@ def changed_from_json(before: Annotation, changes: Any) -> Annotation:
     try:
         values = {name: CODECS.get(name, (_as_it_is, _as_it_is))[1](value) for name, value in changes.items()}
         return replace(before, **values)
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"A step of the history is garbled ({error}).") from error

@@ -1,4 +1,4 @@
-"""What people decided about the room, saved views and layers' colours: one file each, for all recordings.
+"""What people decided about the room, saved views, layers and their colours: one file each, for all recordings.
 
 The recording's journal has them too, so that they can be undone, and is written first. Another recording's history is
 brought up to these files when it is opened (`History.with_room_of`). A kill between the two leaves the journal without
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from gazeloc_app.annotation.layers_json import read_layers, write_layers
 from gazeloc_app.state import Annotation, AppState, Layer
 from gazeloc_core.errors import GazelocError, ProjectError
 from gazeloc_core.surfaces.layer_colors import read_layer_colors, write_layer_colors
@@ -40,6 +41,10 @@ class RoomSaver:
             found = replace(found, tints=tuple((known[name], colors[name]) for name in colors if name in known))
         except GazelocError as error:
             self._put_aside("colors.json", error)
+        try:
+            found = replace(found, layers=read_layers(self._folder))
+        except GazelocError as error:
+            self._put_aside("layers.json", error)
         self._written = found
         return found
 
@@ -58,9 +63,12 @@ class RoomSaver:
             if now.tints != self._written.tints:
                 write_layer_colors(self._folder, {layer.value: tint for layer, tint in now.tints})
                 self._written = replace(self._written, tints=now.tints)
+            if now.layers != self._written.layers:
+                write_layers(self._folder, now.layers)
+                self._written = replace(self._written, layers=now.layers)
         except OSError as error:
             raise ProjectError(
-                f"{self._folder}: saved views and layers' colours could not be written ({error.strerror}); "
+                f"{self._folder}: saved views and what shows in the scene could not be written ({error.strerror}); "
                 "free some space there."
             ) from error
 

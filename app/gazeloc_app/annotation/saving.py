@@ -24,6 +24,8 @@ from gazeloc_core.storage.journal import Journal
 
 MAX_LINES = 4 * MAX_UNDO
 """A journal that is longer is written anew, with the steps alone that can still be reached."""
+IN_THE_JOURNAL = ("is_live", "compared_with")
+"""The fields of `Annotation` that the app alone reads: the journal is their only place."""
 _TAIL_BYTES = 256
 _log = logging.getLogger(__name__)
 
@@ -64,7 +66,8 @@ class Saver:
         if not is_settled:
             self._unsettled.add(recording)
         else:
-            files = replace(files, **{name: getattr(history.present, name) for name in ABOUT_THE_ROOM})
+            elsewhere = (*ABOUT_THE_ROOM, *IN_THE_JOURNAL)
+            files = replace(files, **{name: getattr(history.present, name) for name in elsewhere})
             if history.present != files:
                 self._wanted[recording] = history.then(files)
         return self._wanted[recording]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
+from gazeloc_app.annotation.layer_steps import describe_comparison, describe_layers
 from gazeloc_app.state import Annotation, Layer
 from gazeloc_core.frames.marks import FrameMarks
 from gazeloc_core.keypoints import KeypointPair, KeypointSet
@@ -27,13 +26,11 @@ def describe(before: Annotation, after: Annotation) -> str:
         found.append(_views(before.views, after.views))
     if before.tints != after.tints:
         found.append(_tints(before, after))
-    told = {"keypoints", "marks", "alignment", "alignment_by_person", "method", "views", "tints"}
-    others = (field.name for field in fields(Annotation) if field.name not in told)
-    found += [
-        f"{name.replace('_', ' ').capitalize()} changed"
-        for name in others
-        if getattr(before, name) != getattr(after, name)
-    ]
+    found += describe_layers(before.layers, after.layers)
+    if before.compared_with != after.compared_with:
+        found.append(describe_comparison(after))
+    if before.is_live != after.is_live and not (found and before.alignment != after.alignment):
+        found.append(f"Alignment {'follows' if after.is_live else 'no longer follows'} the keypoints")
     return "; ".join(found) or "Nothing changed"
 
 

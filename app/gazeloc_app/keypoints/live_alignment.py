@@ -98,8 +98,8 @@ class LiveAlignment:
 
 def is_following(data: ProjectData, state: AppState) -> bool:
     """Whether the alignment follows the keypoints: a person wants it, and what is in force is a fit to keypoints."""
-    if not state.is_live or state.annotation.alignment is None:
-        return state.is_live
+    if not state.annotation.is_live or state.annotation.alignment is None:
+        return state.annotation.is_live
     alignment = data.alignment(state.recording, state.annotation.alignment)
     return alignment is not None and alignment.method is AlignmentMethod.KEYPOINTS
 

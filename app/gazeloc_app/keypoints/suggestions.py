@@ -49,7 +49,7 @@ class Proposals:
     def of(self, state: AppState) -> Proposal | None:
         """The place to click next; None where suggestions are off, or there is nothing to choose from."""
         model, scan_from_sfm = self._data.model(state.recording), shown_scan_from_sfm(self._data, state)
-        if not state.suggests or model is None or scan_from_sfm is None:
+        if not state.layers.suggests or model is None or scan_from_sfm is None:
             return None
         pairs = gather(self._data.scan_tags(), self._data.sfm_tags(state.recording), state.annotation.keypoints)
         key = (model, scan_from_sfm, pairs.names, pairs.scan.tobytes(), pairs.sfm.tobytes())

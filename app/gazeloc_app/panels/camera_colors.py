@@ -10,6 +10,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import MAX_THINNING, ColorCameras, ThinCameras
 from gazeloc_app.palette import STATUSES, Rgb, hexadecimal
+from gazeloc_app.panels.strokes import Strokes
 from gazeloc_app.scene.cameras import SceneCameras
 from gazeloc_app.state import AppState, Coloring
 from gazeloc_core.charts.color_scale import NO_VALUE, ColorScale
@@ -40,7 +41,11 @@ class CameraColors:
                 "As many as fit", hint="Leave it to their number: few enough to see the room.", color="gray"
             )
         widgets.on_user(self._coloring, lambda event: _color(dispatch, str(event.target.value)))
-        widgets.on_user(self._thinning, lambda event: dispatch(ThinCameras(int(event.target.value))))
+        strokes = Strokes()
+        widgets.on_user(
+            self._thinning,
+            lambda event: dispatch(ThinCameras(int(event.target.value), strokes.of(event.client_id))),
+        )
         widgets.on_user(self._automatic, lambda _: dispatch(ThinCameras(None)), event="on_click")
 
     def render(self, state: AppState) -> None:

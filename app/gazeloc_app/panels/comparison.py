@@ -89,7 +89,7 @@ class ComparisonHtml:
 
     def _pictures(self, state: AppState, key: str | None, other: tuple[str, str | None] | None) -> dict[str, str]:
         url = f"/frames/{quote(state.recording)}/{{}}.jpg?rev={self._revision}"
-        if state.draws_tags:
+        if state.layers.draws_tags:
             url += f"{state.data_revision}&tags=1"
         render, poses = self._renders(state.recording, key)
         other_render, other_poses = self._renders(state.recording, other[1] if other else None)

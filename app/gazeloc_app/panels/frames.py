@@ -83,12 +83,12 @@ class FramePanel:
         self._playing.render(state)
         key = self._data.poses_key(state.recording, state.annotation)
         keypoints = (state.annotation.keypoints, state.selected_key, state.layers.is_visible(Layer.KEYPOINTS))
-        found = (state.recording, key, state.data_revision, state.annotation.marks, state.compared_with)
+        found = (state.recording, key, state.data_revision, state.annotation.marks, state.annotation.compared_with)
         if found != self._seen_timeline:
             self._seen_timeline = found
             self._render_timeline(state, key)
             self._render_others(state)
-        seen = (found, keypoints, state.frame, state.renderer_note, state.draws_tags, meanwhile(state))
+        seen = (found, keypoints, state.frame, state.renderer_note, state.layers.draws_tags, meanwhile(state))
         if seen == self._seen:
             return
         self._seen = seen
@@ -98,7 +98,7 @@ class FramePanel:
         trajectory = self._data.trajectory(state.recording, key)
         status = PoseStatus.NONE.value if trajectory is None else str(trajectory.status[frame])
         has_pose = PoseStatus(status).has_pose
-        widgets.set_value(self._tags, state.draws_tags)
+        widgets.set_value(self._tags, state.layers.draws_tags)
         is_anywhere = has_pose or image_of_frame(self._data, state.recording, frame) is not None
         widgets.set_property(self._look, "disabled", not is_anywhere)
         self._comparison.show(state, frame, self._other_poses(state))
@@ -152,12 +152,12 @@ class FramePanel:
         self._others = {NOTHING: ""} | methods | alignments
         if tuple(self._other.options) != tuple(self._others):
             self._other.options = tuple(self._others)
-        label = next((name for name, poses in self._others.items() if poses == state.compared_with), NOTHING)
+        label = next((name for name, poses in self._others.items() if poses == state.annotation.compared_with), NOTHING)
         widgets.set_value(self._other, label)
 
     def _other_poses(self, state: AppState) -> tuple[str, str | None] | None:
         """What B is, for people, and its key; None for nothing, or where it is gone."""
-        poses = state.compared_with
+        poses = state.annotation.compared_with
         if not poses or poses not in self._others.values():
             return None
         if poses in tuple(Method):

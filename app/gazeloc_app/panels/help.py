@@ -8,7 +8,7 @@ from typing import Any
 from viser import GuiApi
 
 from gazeloc_app import widgets
-from gazeloc_app.panels.history import UNDONE
+from gazeloc_app.annotation.kinds import UNDONE
 from gazeloc_app.state import AppState
 
 MOUSE = (

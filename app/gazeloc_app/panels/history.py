@@ -10,17 +10,12 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.annotation.history import History
+from gazeloc_app.annotation.kinds import UNDONE
 from gazeloc_app.annotation.steps import describe
 from gazeloc_app.state import AppState
 
 MAX_SHOWN = 60
 """Steps in the list, around the one in force; the others are reached by going on from there."""
-
-
-UNDONE = (
-    "Every keypoint, alignment, method, mark, saved view and colour of a layer is a step that can be undone. "
-    "What shows and what is hidden, and where a browser looks from, is none."
-)
 
 
 class HistoryPanel:

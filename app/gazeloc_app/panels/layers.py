@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -13,6 +12,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import ShowLayer, TintLayer, UseSafeColors
 from gazeloc_app.palette import USUAL, Cameras
+from gazeloc_app.panels.strokes import Strokes
 from gazeloc_app.state import AppState, Layer, LayerSettings
 
 HINTS = {
@@ -30,8 +30,6 @@ HINTS = {
     Layer.PEOPLE: "Where the others who are here look from, in their colours.",
     Layer.GAZE: "Where the wearer looked at the frame that is shown.",
 }
-_SAME_STROKE_S = 1.5
-"""A colour field sends a colour at every movement of the pointer; a rest of so long begins a new step."""
 _NAMED = (Layer.TRUTH, Layer.ESTIMATE, Layer.PHONE)
 """Whose colours have words in `palette.Cameras.words`."""
 OF_THE_ROOM = (Layer.SCAN, Layer.SCAN_TAGS, Layer.PHONE, Layer.GRID, Layer.PEOPLE)
@@ -51,8 +49,7 @@ class LayerPanel:
     ):
         """`facts(state)` are sentences about what is drawn with less than there is."""
         self._facts, self._dispatch = facts, dispatch
-        self._stroke, self._pulled_s = 0, 0.0
-        self._puller: object = None
+        self._strokes = Strokes()
         self._boxes = {}
         for layer in layers:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=_hint(layer, USUAL))
@@ -75,19 +72,15 @@ class LayerPanel:
         widgets.on_user(self._own, lambda _: dispatch(TintLayer(Layer(self._which.value), None)), event="on_click")
 
     def _tint(self, event: Any) -> None:
-        layer, now = Layer(self._which.value), time.monotonic()
-        puller = (layer, event.client_id)
-        if puller != self._puller or now > self._pulled_s + _SAME_STROKE_S:
-            self._stroke += 1
-        self._puller, self._pulled_s = puller, now
-        self._dispatch(TintLayer(layer, _rgb(event.target.value), self._stroke))
+        layer = Layer(self._which.value)
+        self._dispatch(TintLayer(layer, _rgb(event.target.value), self._strokes.of((layer, event.client_id))))
 
     def render(self, state: AppState) -> None:
         """Show the state's layers."""
         for layer, box in self._boxes.items():
             widgets.set_value(box, state.layers.is_visible(layer))
             widgets.set_property(box, "hint", _hint(layer, state.cameras))
-        widgets.set_value(self._safe, state.layers.are_colors_safe)
+        widgets.set_value(self._safe, state.are_colors_safe)
         facts = "<br>".join(widgets.text(fact) for fact in self._facts(state))
         widgets.set_content(self._note, widgets.box(facts) if facts else "")
 

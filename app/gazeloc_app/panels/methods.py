@@ -69,7 +69,7 @@ class MethodPanel:
             widgets.set_content(self._summary, widgets.box(widgets.text(method.summary)))
             widgets.set_content(self._table, widgets.box(self._table_html(state)))
         for method, box in self._boxes.items():
-            widgets.set_value(box, method in state.compared)
+            widgets.set_value(box, method in state.layers.compared)
         self._render_pictures(state, seen)
 
     def _table_html(self, state: AppState) -> str:
@@ -106,12 +106,15 @@ class MethodPanel:
         return f"{int(is_localised.sum())} of {len(trajectory)}", error, apart
 
     def _render_pictures(self, state: AppState, seen: object) -> None:
-        key = (seen, state.frame, state.compared)
+        key = (seen, state.frame, state.layers.compared)
         if key == self._seen_renders:
             return
         self._seen_renders = key
-        methods = [state.annotation.method, *(m for m in Method if m in state.compared - {state.annotation.method})]
-        pictures = "".join(self._picture(state, method) for method in methods) if state.compared else ""
+        methods = [
+            state.annotation.method,
+            *(m for m in Method if m in state.layers.compared - {state.annotation.method}),
+        ]
+        pictures = "".join(self._picture(state, method) for method in methods) if state.layers.compared else ""
         widgets.set_content(self._renders, widgets.box(pictures) if pictures else "")
 
     def _picture(self, state: AppState, method: Method) -> str:

@@ -49,9 +49,9 @@ class SuggestionPanel:
     def render(self, state: AppState) -> None:
         """Show the proposal for the state's pairs."""
         self._proposal = self._proposals.of(state)
-        widgets.set_value(self._switch, state.suggests)
+        widgets.set_value(self._switch, state.layers.suggests)
         text = "" if self._proposal is None else self._proposal.text
-        if state.suggests and self._proposal is None:
+        if state.layers.suggests and self._proposal is None:
             text = "There is no place to suggest before there is a reconstruction."
         widgets.set_content(self._text, widgets.box(widgets.text(text)) if text else "")
         for handle in (self._go, self._start):

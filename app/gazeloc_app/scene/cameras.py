@@ -92,7 +92,7 @@ class SceneCameras:
     ) -> None:
         is_chosen = method is state.annotation.method
         layer = self.estimate if is_chosen else self.compared[method]
-        trajectory = self._trajectory(state, method) if is_chosen or method in state.compared else None
+        trajectory = self._trajectory(state, method) if is_chosen or method in state.layers.compared else None
         tint = state.annotation.tint(Layer.ESTIMATE) if is_chosen else None
         color: Rgb = tint or (state.cameras.estimate if is_chosen else state.cameras.methods[method])
         coloring = state.layers.coloring
