@@ -135,6 +135,8 @@ class RoomScan:
     """The file's axis that points to the ceiling: "x", "y" or "z", with a "-" before it where it points down."""
     notes: tuple[str, ...] = ()
     """What the reader found worth saying to the user, a sentence each."""
+    metres_per_unit: float = 1.0
+    """What the mesh file's own coordinates were multiplied with; other programs show them as they are."""
 
     @property
     def frames_with_images(self) -> tuple[ScanFrame, ...]:

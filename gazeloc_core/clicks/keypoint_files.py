@@ -9,7 +9,8 @@
 | Stray's `keypoints.json` | one side: {"keypoints": [{"position": [x, y, z]}, ...]} | Stray's scene format |
 
 What is read is a `KeypointSet` with keys of its own; `merged` brings it into the keypoints that are there. The frame
-`scan` is the scan file's own, in metres, so points picked on that file in another program fit as they are.
+`scan` has the scan file's own axes, so points picked on that file in another program fit. Our own files are in metres;
+those of other programs are in the unit of the scan file, which may be millimetres.
 """
 
 from __future__ import annotations
@@ -23,20 +24,24 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from gazeloc_core.arrays import Floats
 from gazeloc_core.clicks import cloudcompare_points
 from gazeloc_core.clicks.keypoint_cells import REMEDY, SideName, name_of, one_sided, point_of
 from gazeloc_core.errors import InputError
-from gazeloc_core.keypoints import KeypointPair, KeypointSet
+from gazeloc_core.keypoints import KeypointPair, KeypointSet, Point
 
 COLUMNS = ("name", "enabled", "scan_x_m", "scan_y_m", "scan_z_m", "sfm_x", "sfm_y", "sfm_z")
 MOST_PAIRS = 5000
 MOST_BYTES = 4_000_000
 
 
-def read_keypoints(name: str, content: bytes, side: SideName) -> KeypointSet:
+def read_keypoints(name: str, content: bytes, side: SideName, metres_per_unit: float = 1.0) -> KeypointSet:
     """The keypoints in a file of any of the formats above.
 
-    `side` is that of formats which hold only one, and of the reference in tables of pairs.
+    `side` is that of formats which hold only one, and of the reference in tables of pairs. `metres_per_unit` is that of
+    the scan file (`RoomScan.metres_per_unit`).
 
     Raises:
         InputError: with the file's `name` and the row, if it is none of them, is garbled, or holds nothing.
@@ -47,19 +52,42 @@ def read_keypoints(name: str, content: bytes, side: SideName) -> KeypointSet:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError.of(name, f"the file is not UTF-8 text (byte {error.start})", REMEDY) from error
+    is_ours = False
     if cloudcompare_points.is_table_of_pairs(text):
         pairs = cloudcompare_points.from_table_of_pairs(name, text, side)
     elif text.lstrip()[:1] in ("{", "["):
-        pairs = _from_json(name, text, side)
+        pairs, is_ours = _from_json(name, text, side), text.lstrip()[0] == "["
     elif re.match(r"\s*name\s*,\s*enabled\s*,", text):
-        pairs = _from_csv(name, text)
+        pairs, is_ours = _from_csv(name, text), True
     else:
         pairs = cloudcompare_points.from_list(name, text, side)
     if not pairs:
         raise InputError.of(name, "the file holds no keypoint", REMEDY)
     if len(pairs) > MOST_PAIRS:
         raise InputError.of(name, f"the file holds {len(pairs)} keypoints, at most {MOST_PAIRS} can be taken", REMEDY)
-    return KeypointSet(tuple(replace(pair, key=f"k{i}") for i, pair in enumerate(pairs, start=1)))
+    read = KeypointSet(tuple(replace(pair, key=f"k{i}") for i, pair in enumerate(pairs, start=1)))
+    return read if is_ours else _in_unit(read, metres_per_unit)
+
+
+def far_outside(keypoints: KeypointSet, low: Floats, high: Floats) -> str:
+    """A sentence where points on the scan lie far outside of the room between its corners (3,), else nothing."""
+    points = np.array([pair.scan for pair in keypoints if pair.scan is not None]).reshape(-1, 3)
+    reach = float(np.linalg.norm(high - low))
+    outside = int((np.maximum(low - points, points - high).max(axis=1, initial=0.0) > reach).sum())
+    if outside == 0:
+        return ""
+    return f" {outside} of them lie far outside of the scan: is that side right, and the list in the scan file's unit?"
+
+
+def _in_unit(keypoints: KeypointSet, factor: float) -> KeypointSet:
+    """The keypoints with the places on the scan multiplied; the very same for a factor of 1."""
+    if factor == 1:
+        return keypoints
+
+    def scaled(point: Point | None) -> Point | None:
+        return None if point is None else (factor * point[0], factor * point[1], factor * point[2])
+
+    return KeypointSet(tuple(replace(pair, scan=scaled(pair.scan)) for pair in keypoints))
 
 
 def merged(present: KeypointSet, read: KeypointSet) -> KeypointSet:
@@ -101,6 +129,12 @@ def to_stray_text(keypoints: KeypointSet, side: SideName) -> str:
     """One side as Stray's `keypoints.json`, which has no names."""
     points = [point for pair in keypoints if (point := getattr(pair, side)) is not None]
     return json.dumps({"keypoints": [{"position": list(point)} for point in points]}, indent=1) + "\n"
+
+
+def keypoints_text(format: str, keypoints: KeypointSet, metres_per_unit: float = 1.0) -> str:
+    """The text of a file in one of the `WRITERS`' formats: ours in metres, others in the unit of the scan file."""
+    is_ours = format in ("json", "csv")
+    return WRITERS[format][1](keypoints if is_ours else _in_unit(keypoints, 1 / metres_per_unit))
 
 
 Writer = Callable[[KeypointSet], str]

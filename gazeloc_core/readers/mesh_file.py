@@ -66,7 +66,8 @@ def read(path: Path, unit: str | None, up_axis: str | None, report: Report) -> R
     if (odd := _implausible(mesh, unit)) is not None:
         notes.append(f"That is {odd} for a scan: if the unit is another one, make the project anew with --unit.")
     scaled = Mesh(mesh.vertices * scale, mesh.faces, mesh.colors, mesh.texture)
-    return RoomScan(path, f"{file.suffix[1:].upper()} mesh", scaled, up_axis=up_axis, notes=tuple(notes))
+    kind = f"{file.suffix[1:].upper()} mesh"
+    return RoomScan(path, kind, scaled, up_axis=up_axis, notes=tuple(notes), metres_per_unit=scale)
 
 
 def check_unit_and_axis(unit: str | None, up_axis: str | None) -> None:

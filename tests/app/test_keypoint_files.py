@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -32,7 +33,13 @@ def app(tmp_path):
 
 @pytest.fixture
 def panel(app):
-    return KeypointFiles(app.server.gui, app.store.state, app.store.dispatch)
+    return KeypointFiles(app.server.gui, app.store.state, app.data.scan, app.store.dispatch)
+
+
+@pytest.fixture
+def panel_in_mm(app):
+    scan = replace(app.data.scan(), metres_per_unit=0.001)
+    return KeypointFiles(app.server.gui, app.store.state, lambda: scan, app.store.dispatch)
 
 
 def test_reading_a_list_is_one_step_and_is_saved(app, panel):
@@ -43,6 +50,27 @@ def test_reading_a_list_is_one_step_and_is_saved(app, panel):
     assert "2 of them new" in app.store.state.notice.text
     step(app, Undo())
     assert [pair.name for pair in app.project.keypoints("walk")] == ["Keypoint 1"]
+
+
+def test_lists_of_other_programs_are_in_the_unit_of_the_scan_file(app, panel_in_mm):
+    panel_in_mm._read(SimpleNamespace(name="picked.txt", content=b"lamp,1000,2000,500\n"))
+    app.store.step()
+    assert [pair.scan for pair in app.store.state.annotation.keypoints] == [pytest.approx((1, 2, 0.5))]
+    assert "outside" not in app.store.state.notice.text
+    panel_in_mm.render(app.store.state)
+    panel_in_mm._format.value = "CloudCompare, on the scan"
+    sent = []
+    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content: sent.append(content)))
+    assert read_keypoints("x", sent[0], "scan").pairs[0].scan == pytest.approx((1000, 2000, 500))
+    panel_in_mm._format.value = "CSV"
+    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content: sent.append(content)))
+    assert read_keypoints("x", sent[1], "scan", 0.001).pairs[0].scan == pytest.approx((1, 2, 0.5))
+
+
+def test_a_list_in_the_wrong_unit_is_noticed(app, panel):
+    panel._read(SimpleNamespace(name="picked.txt", content=b"lamp,1000,2000,500\ndesk,1,1,1\n"))
+    app.store.step()
+    assert "1 of them lie far outside of the scan" in app.store.state.notice.text
 
 
 def test_a_bad_file_is_a_sentence_and_nothing_is_lost(app, panel):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from gazeloc_core.clicks.keypoint_cells import SideName
-from gazeloc_core.clicks.keypoint_files import WRITERS, merged, read_keypoints
+from gazeloc_core.clicks.keypoint_files import WRITERS, far_outside, keypoints_text, merged, read_keypoints
 from gazeloc_core.errors import InputError, ProjectError
 from gazeloc_core.project import Project
+from gazeloc_core.stages import inputs
 from gazeloc_core.storage.files import write_text_atomically
 from gazeloc_core.storage.user_files import read_bytes
 
@@ -16,13 +17,15 @@ def import_keypoints(folder: Path, file: Path, *, recording: str | None, side: S
     """Merge the keypoints of a file into the recording's, and say how many there are now."""
     project = Project.open(folder)
     name = _recording(project, recording)
-    read = read_keypoints(str(file), read_bytes(file), side)
+    content, scan = read_bytes(file), inputs.load_scan(project)
+    read = read_keypoints(str(file), content, side, scan.metres_per_unit)
     with project.lock():
         before = project.keypoints(name)
         after = merged(before, read)
         project.save_keypoints(name, after)
     counting = sum(pair.counts for pair in after)
-    print(f"{name}: {len(read)} keypoints from {file}, {len(after) - len(before)} of them new; {counting} pairs count.")
+    text = f"{name}: {len(read)} keypoints from {file}, {len(after) - len(before)} of them new; {counting} pairs count."
+    print(f"{text}{far_outside(read, *scan.mesh.bounds)}")
 
 
 def export_keypoints(folder: Path, file: Path, *, recording: str | None, format: str | None) -> None:
@@ -36,7 +39,8 @@ def export_keypoints(folder: Path, file: Path, *, recording: str | None, format:
     if len(keypoints) == 0:
         raise ProjectError(f"{name}: there is no keypoint to export; click some in the app (`gazeloc view`).")
     try:
-        write_text_atomically(file, WRITERS[chosen][1](keypoints))
+        unit_m = inputs.load_scan(project).metres_per_unit
+        write_text_atomically(file, keypoints_text(chosen, keypoints, unit_m))
     except OSError as error:
         raise InputError.of(file, f"it cannot be written ({error.strerror})", "name another file") from error
     print(f"{file}: {len(keypoints)} keypoints.")

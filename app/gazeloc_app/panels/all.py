@@ -116,7 +116,7 @@ MAIN_TABS = (
             lambda desk: SuggestionPanel(
                 desk.gui, Proposals(desk.data), desk.dispatch, desk.go_to, SuggestionLayer(desk.server.scene).show
             ),
-            lambda desk: KeypointFiles(desk.gui, desk.state, desk.dispatch),
+            lambda desk: KeypointFiles(desk.gui, desk.state, desk.data.scan, desk.dispatch),
         ),
     ),
     Tab("Align", (lambda desk: AlignmentPanel(desk.gui, desk.data, desk.dispatch),)),

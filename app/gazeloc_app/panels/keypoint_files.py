@@ -13,8 +13,9 @@ from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.files import ImportKeypoints
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.clicks.keypoint_cells import SideName
-from gazeloc_core.clicks.keypoint_files import WRITERS, read_keypoints
+from gazeloc_core.clicks.keypoint_files import WRITERS, far_outside, keypoints_text, read_keypoints
 from gazeloc_core.errors import InputError
+from gazeloc_core.scan import RoomScan
 
 SIDES: dict[str, SideName] = {"the scan": "scan", "the reconstruction": "sfm"}
 FORMATS = {
@@ -30,8 +31,9 @@ FORMATS = {
 class KeypointFiles:
     """Import by an upload, export by a download; nothing is written on the server."""
 
-    def __init__(self, gui: GuiApi, state: AppState, dispatch: Callable[[Action], None]):
-        self._state, self._dispatch = state, dispatch
+    def __init__(self, gui: GuiApi, state: AppState, scan: Callable[[], RoomScan], dispatch: Callable[[Action], None]):
+        """`scan()` is what keypoints are clicked on; lists of other programs are in its file's unit."""
+        self._state, self._scan, self._dispatch = state, scan, dispatch
         with gui.add_folder("Files", expand_by_default=False):
             self._side = gui.add_dropdown(
                 "Lists are of",
@@ -57,11 +59,14 @@ class KeypointFiles:
         name = " ".join(str(file.name).split())[:80]
         side = SIDES.get(str(self._side.value), "scan")
         try:
-            self._dispatch(ImportKeypoints(read_keypoints(name, bytes(file.content), side), name))
+            scan = self._scan()
+            read = read_keypoints(name, bytes(file.content), side, scan.metres_per_unit)
+            self._dispatch(ImportKeypoints(read, name, far_outside(read, *scan.mesh.bounds)))
         except InputError as error:
             self._dispatch(Notify(Level.ERROR, str(error)))
 
     def _send(self, client: Any) -> None:
-        ending, write = WRITERS[FORMATS.get(str(self._format.value), "json")]
+        chosen = FORMATS.get(str(self._format.value), "json")
+        text = keypoints_text(chosen, self._state.annotation.keypoints, self._scan().metres_per_unit)
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", self._state.recording)
-        client.send_file_download(f"{stem}-keypoints{ending}", write(self._state.annotation.keypoints).encode())
+        client.send_file_download(f"{stem}-keypoints{WRITERS[chosen][0]}", text.encode())
