@@ -26,8 +26,8 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
 from gazeloc_app.drawing.pictures import Pictures
+from gazeloc_app.drawing.render_jobs import Describe
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Describe
 from gazeloc_app.drawing.sources import sources_of
 from gazeloc_app.frames.first_pose import FirstPose
 from gazeloc_app.frames.player import Player

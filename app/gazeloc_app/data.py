@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from gazeloc_app.memory import Memory
 from gazeloc_app.state import Annotation
 from gazeloc_core.alignment.alignment import Alignment
 from gazeloc_core.alignment.paper_keypoints import SfmTagCenters, sfm_tag_centers
@@ -32,7 +34,7 @@ from gazeloc_core.stages.pieces import placed_pieces
 from gazeloc_core.stages.recording import load_keyframes
 from gazeloc_core.stages.scores import FORMULA, FrameScores, load_scores
 from gazeloc_core.stages.tracking import load_tracked
-from gazeloc_core.storage.artifacts import HEADER, Artifact
+from gazeloc_core.storage.artifacts import Artifact
 from gazeloc_core.storage.files import read_json
 from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.tag_types import TagCorners, TagSightings
@@ -52,7 +54,7 @@ class FrameErrors:
 
 
 class ProjectData:
-    """Reads of one project, remembered by content. Safe to use from several threads.
+    """Reads of one project, remembered by content. Safe to use from several threads (see `Memory`).
 
     What a stage made may be damaged: then it is as if it were not there, and `say` is told the sentence, once.
     """
@@ -61,8 +63,9 @@ class ProjectData:
         self.project = project
         self._say = say
         self._said: set[str] = set()
-        self._lock = threading.RLock()
-        self._known: dict[str, tuple[object, Any]] = {}
+        self._remember = Memory().of
+        self._lock = threading.Lock()
+        """Of what follows; never held while something is read."""
         self._slots: dict[str, list[tuple[int, str | None]]] = {}
 
     def scan(self) -> RoomScan:
@@ -146,7 +149,7 @@ class ProjectData:
         method = method or annotation.method
         if method is Method.SFM:
             return annotation.alignment
-        stamp = _stamp(self.project.result(recording, method, "trajectory"))
+        stamp = self.project.result(recording, method, "trajectory").result_stamp
         return None if stamp is None else f"{method}@{stamp[0]:x}-{stamp[1]:x}"
 
     def trajectory(self, recording: str, key: str | None) -> Trajectory | None:
@@ -167,7 +170,8 @@ class ProjectData:
         times = self.recording(recording).timestamp_ns
         placed = [PlacedModel(model, alignment.scan_from_sfm, self.tracked(recording)), *self.pieces(recording)]
         load = lambda: localize_sfm(times, keyframes, placed)  # noqa: E731
-        content = (key, model, id(keyframes), _stamp(self.project.artifact(recording, "pieces")), placed[0].tracked)
+        made_of = (self.project.artifact(recording, stage).result_stamp for stage in ("keyframes", "pieces"))
+        content = (key, model, *made_of, placed[0].tracked)
         return self._remember_or_say(f"{recording} trajectory {self._slot(recording, key)}", content, load)
 
     def _slot(self, recording: str, key: str | None) -> int:
@@ -181,7 +185,7 @@ class ProjectData:
     def tracked(self, recording: str) -> TrackedFrames | None:
         """The frames tracked between the reconstruction's images."""
         artifact = self.project.artifact(recording, "tracking")
-        content = (_stamp(artifact), _stamp(inputs.sfm_models(self.project, recording)))
+        content = (artifact.result_stamp, inputs.sfm_models(self.project, recording).result_stamp)
         return self._remember_or_say(f"{recording} tracked", content, lambda: load_tracked(self.project, recording))
 
     def pieces(self, recording: str) -> list[PlacedModel]:
@@ -200,24 +204,11 @@ class ProjectData:
         artifact = self.project.artifact(recording, "pieces")
         return self._read(f"{recording} piece reasons", artifact, lambda: artifact.header().notes) or ()
 
-    def tag_support(self, recording: str, method: Method, frame: int) -> str:
-        """What a frame's pose rests on where tags alone gave it, a sentence; "" for other methods and without pose."""
+    def tag_columns(self, recording: str, method: Method) -> dict[str, NDArray[Any]] | None:
+        """What each pose of a method of tags rests on, columns over the frames (see `stages.tags`); None for others."""
         artifact = self.project.result(recording, method, "trajectory")
         columns = self._read(f"{recording} {method} columns", artifact, artifact.read_arrays)
-        if columns is None or "tags_used" not in columns or frame >= len(columns["tags_used"]):
-            return ""
-        used, off_m = int(columns["tags_used"][frame]), float(columns["disagreement_m"][frame])
-        if used == 0:
-            return "Its tag has two possible poses." if bool(columns["is_ambiguous"][frame]) else ""
-        return f"Rests on {used} tag{'s' if used > 1 else ''}; the worst is {100 * off_m:.1f} cm from its place."
-
-    def track_support(self, recording: str, frame: int) -> str:
-        """What a tracked frame's pose rests on, a sentence; "" where the largest piece has not tracked it."""
-        tracked = self.tracked(recording)
-        row = -1 if tracked is None else int(np.searchsorted(tracked.frame_indices, frame))
-        if tracked is None or row == len(tracked) or tracked.frame_indices[row] != frame:
-            return ""
-        return f"Rests on {tracked.points[row]} points of the keyframes around it, {tracked.error_px[row]:.1f} px off."
+        return columns if columns is not None and "tags_used" in columns else None
 
     def truth(self, recording: str) -> tuple[Ints, RigidTransform] | None:
         """The ground truth: times and `scan_from_camera`."""
@@ -240,7 +231,7 @@ class ProjectData:
             return poses[rows[rows >= 0]] if (rows >= 0).any() else None
 
         return self._remember(
-            f"{recording} true keyframes", _stamp(self.project.artifact(recording, "keyframes")), load
+            f"{recording} true keyframes", self.project.artifact(recording, "keyframes").result_stamp, load
         )
 
     def errors(self, recording: str, key: str | None) -> FrameErrors | None:
@@ -258,7 +249,7 @@ class ProjectData:
             return None
         method = method_of(key)
         poses, artifact = (self.project.result(recording, method, stage) for stage in ("trajectory", "scores"))
-        stamp, count = _stamp(artifact), len(self.recording(recording))
+        stamp, count = artifact.result_stamp, len(self.recording(recording))
         if stamp is None:
             return None
 
@@ -269,7 +260,7 @@ class ProjectData:
             is_current = made_of.get("trajectory") == trajectory.content and made_of.get("formula") == FORMULA
             return load_scores(artifact, count) if of_these and is_current else None
 
-        return self._remember_or_say(f"{recording} {method} scores", (stamp, _stamp(poses), key), load)
+        return self._remember_or_say(f"{recording} {method} scores", (stamp, poses.result_stamp, key), load)
 
     def scores(self, recording: str, key: str | None) -> Floats:
         """The agreement (N,) of all frames by the poses of a key, 0 to 1, NaN where there is none."""
@@ -292,7 +283,7 @@ class ProjectData:
         """The reconstruction's points under tags (figure 9); None without tags or a reconstruction."""
         model, camera = self.model(recording), self.camera(recording)
         artifact = self.project.artifact(recording, "tags")
-        stamp = _stamp(artifact)
+        stamp = artifact.result_stamp
         if model is None or camera is None or stamp is None:
             return None
         load = lambda: sfm_tag_centers(  # noqa: E731
@@ -302,7 +293,7 @@ class ProjectData:
 
     def _read(self, name: str, artifact: Artifact, load: Callable[[], T]) -> T | None:
         """What `load` reads of an artifact; None where it is not there or damaged."""
-        stamp = _stamp(artifact)
+        stamp = artifact.result_stamp
         return None if stamp is None else self._remember_or_say(name, stamp, load)
 
     def _remember_or_say(self, name: str, content: object, load: Callable[[], T]) -> T | None:
@@ -312,35 +303,22 @@ class ProjectData:
             try:
                 return load()
             except GazelocError as error:
-                if str(error) not in self._said:
-                    self._said.add(str(error))
-                    self._say(str(error))
+                self._say_once(str(error))
                 return None
 
         return self._remember(name, content, load_or_say)
 
-    def _remember(self, name: str, content: object, load: Callable[[], T]) -> T:
+    def _say_once(self, sentence: str) -> None:
         with self._lock:
-            known = self._known.get(name)
-            if known is None or known[0] != content:
-                known = (content, load())
-                self._known[name] = known
-            value: T = known[1]
-            return value
+            is_new = sentence not in self._said
+            self._said.add(sentence)
+        if is_new:
+            self._say(sentence)
 
 
 def method_of(key: str | None) -> Method:
     """The method whose poses a key names (see `ProjectData.poses_key`)."""
     return Method(key.partition("@")[0]) if key is not None and "@" in key else Method.SFM
-
-
-def _stamp(artifact: Artifact) -> tuple[int, int] | None:
-    """Tells an artifact from the next one in its place without reading it: it is replaced as a whole."""
-    try:
-        status = (artifact.folder / HEADER).stat()
-    except OSError:
-        return None
-    return status.st_mtime_ns, status.st_ino
 
 
 def _frame_errors(trajectory: Trajectory, truth: tuple[Ints, RigidTransform]) -> FrameErrors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -13,8 +14,8 @@ from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.render_jobs import Frame
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Frame
 from gazeloc_app.drawing.scan_screen import ScanScreen
 from gazeloc_app.frames.gaze_at import gaze_in_scan
 from gazeloc_app.frames.settling import Settling
@@ -81,9 +82,15 @@ class SceneView:
         self._gaze = GazeLayer(scene)
         self._selected = SelectedFrameLayer(scene)
         self._settling = Settling()
+        self._drawing = threading.RLock()
+        """Held by who draws: the loop of the store, what waited for rest, and pictures that have come."""
 
     def render(self, state: AppState) -> None:
         """Draw the state."""
+        with self._drawing:
+            self._render_all(state)
+
+    def _render_all(self, state: AppState) -> None:
         scan_from_sfm = shown_scan_from_sfm(self._data, state)
         trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
         self._draw_scan(state)
@@ -173,10 +180,11 @@ class SceneView:
         key = (state.recording, state.frame, trajectory)
 
         def show() -> None:
-            if self._once.last("frame") != key:
-                return  # another frame came while this one waited
-            with self._server.atomic():
-                show_camera_and_gaze()
+            with self._drawing:
+                if self._once.last("frame") != key:
+                    return  # another frame came while this one waited
+                with self._server.atomic():
+                    show_camera_and_gaze()
             if pose is not None:
                 job = Frame(recording=state.recording, index=state.frame, width=THUMBNAIL_PX)
                 future = self._render.submit(job, key="thumbnail")
@@ -191,8 +199,9 @@ class SceneView:
         self._once("frame", key, lambda: later(show))
 
     def _paste(self, key: object, pose: RigidTransform, camera: Any, image: Bytes) -> None:
-        if self._once.last("frame") == key:  # another frame may have been chosen while this one was decoded
-            self._selected.show(pose, camera, image)
+        with self._drawing:
+            if self._once.last("frame") == key:  # another frame may have been chosen while this one was decoded
+                self._selected.show(pose, camera, image)
 
     def _show_and_hide(self, state: AppState) -> None:
         layers = {

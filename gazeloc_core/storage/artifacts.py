@@ -69,9 +69,15 @@ class Artifact:
     def _failure(self) -> Path:
         return self.folder.with_name(f"{self.folder.name}.failed.json")
 
+    @property
+    def result_stamp(self) -> tuple[int, int] | None:
+        """Tells the result from the next one in its place without reading it, since it is replaced as a whole; None
+        without one."""
+        return _stamp_of(self.folder / HEADER)
+
     def stamp(self) -> tuple[tuple[int, int] | None, ...]:
-        """Tells what is there from what was there before without reading it: both files are replaced as a whole."""
-        return tuple(_stamp_of(path) for path in (self.folder / HEADER, self._failure))
+        """Tells what is there, the sentence of a failure too, from what was there before, without reading it."""
+        return self.result_stamp, _stamp_of(self._failure)
 
     def header(self) -> Header:
         """What the artifact says about itself.

@@ -12,7 +12,7 @@ import pytest
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowLayer
 from gazeloc_app.browser import Browser
-from gazeloc_app.drawing.render_worker import Photo
+from gazeloc_app.drawing.render_jobs import Photo
 from gazeloc_app.keypoints.picking import ClickFilter
 from gazeloc_app.scene.frames import PLANE_M
 from gazeloc_app.state import AppState, Layer

@@ -89,6 +89,13 @@ def test_a_worker_that_dies_is_said_and_the_next_job_works(runner: JobRunner, li
     assert run(runner, listener, job_tasks.say_pid).text != before
 
 
+def test_a_job_that_cannot_be_sent_to_the_worker_ends_and_the_next_one_works(runner: JobRunner, listener: Listener):
+    ended = run(runner, listener, lambda folder, report: None)
+    assert ended.level is Level.ERROR
+    assert "A fault in GazeLoc stopped this" in ended.text
+    assert run(runner, listener, job_tasks.say_pid).level is Level.INFO
+
+
 def test_a_worker_killed_between_jobs_is_replaced(runner: JobRunner, listener: Listener):
     before = int(run(runner, listener, job_tasks.say_pid).text)
     os.kill(before, signal.SIGKILL)

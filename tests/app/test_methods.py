@@ -11,6 +11,7 @@ from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.jobs import JobEnded, StartJob
 from gazeloc_app.actions.views import DrawTags, ShowFrame
+from gazeloc_app.frames.support_text import tag_support_text
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.state import Level
 from gazeloc_app.work import tasks
@@ -111,9 +112,11 @@ def test_the_frame_says_what_a_pose_by_tags_rests_on(app, project):
         "is_ambiguous": ~is_seen,
     }
     artifact.write_arrays(columns, options={}, inputs={"made": "up"})
-    assert app.data.tag_support("walk", Method.TAGS, 2) == "Rests on 2 tags; the worst is 3.4 cm from its place."
-    assert app.data.tag_support("walk", Method.TAGS, 3) == "Its tag has two possible poses."
-    assert app.data.tag_support("walk", Method.SFM, 2) == ""
+    read = app.data.tag_columns("walk", Method.TAGS)
+    assert tag_support_text(read, 2) == "Rests on 2 tags; the worst is 3.4 cm from its place."
+    assert tag_support_text(read, 3) == "Its tag has two possible poses."
+    assert app.data.tag_columns("walk", Method.SFM) is None
+    assert tag_support_text(None, 2) == ""
 
 
 def test_figures_are_drawn_where_there_is_something_to_draw_and_say_what_is_missing(app, project):

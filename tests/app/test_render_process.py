@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from gazeloc_app.drawing.render_jobs import Cast, Describe, Frame, Render, Sources, camera_text
 from gazeloc_app.drawing.render_process import Closing, RenderProcess, Superseded
-from gazeloc_app.drawing.render_worker import Cast, Describe, Frame, Render, Sources, camera_text
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import GazelocError, InputError, RenderError

@@ -9,8 +9,8 @@ from concurrent.futures import Future
 from typing import Any
 
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.render_jobs import Frame, Render, camera_text
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Frame, Render, camera_text
 from gazeloc_core.camera import Camera
 from gazeloc_core.errors import InputError
 from gazeloc_core.methods import Method
@@ -36,19 +36,20 @@ class Pictures:
     def __init__(self, data: ProjectData, process: RenderProcess):
         self._data, self._process = data, process
         self._asked: dict[tuple[Frame | Render, str], Future[Any]] = {}
+        self._turn = asyncio.Lock()
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """A frame as JPEG, undistorted; with `tags=1` the tags in it are drawn, with `lens=1` it is as recorded."""
         lens = query.get("lens") == "1"
         tags = query.get("tags") == "1" and not lens
         job = Frame(recording=recording, index=index, width=_width(query), with_tags=tags, as_recorded=lens)
-        return await self._picture("frame", query, job)
+        return await _bytes_of(self._submitted("frame", query, job))
 
     async def thumbnail(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """A frame as a small JPEG for lists; every one that is asked for is made, after what people look at."""
         del query
         job = Frame(recording=recording, index=index, width=THUMBNAIL_PX, as_recorded=True)
-        return bytes(await asyncio.wrap_future(self._process.submit(job, is_later=True)))
+        return await _bytes_of(self._process.submit(job, is_later=True))
 
     async def render(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
         """The scan from the frame's pose of those that `rev` names (see `ProjectData.poses_key`), as JPEG.
@@ -57,22 +58,28 @@ class Pictures:
         """
         if not _KEY.fullmatch(query.get("rev", "")):
             raise InputError("A render is of poses, which `rev` names.")
+        async with self._turn:  # in the order in which they were asked for: the last one is to be submitted last
+            job = await asyncio.to_thread(self._render_job, recording, index, query)
+            kind = f"render {query.get('rev')}"  # poses side by side do not push each other aside
+            drawn = self._submitted(kind, query, job)
+        return await _bytes_of(drawn)
+
+    def _render_job(self, recording: str, index: int, query: Mapping[str, str]) -> Render:
+        """Not for the event loop: poses under another alignment are worked out when they are first asked for."""
         trajectory, camera = self._data.trajectory(recording, query.get("rev")), self._camera(recording, query)
         pose = trajectory.pose(index) if trajectory is not None and index < len(trajectory) else None
         if pose is None or camera is None:
             raise InputError(f"Frame {index} has no pose, so there is no render of it.")
         w, x, y, z = (float(value) for value in wxyz_of(pose.rotation))
         cx, cy, cz = (float(value) for value in pose.translation)
-        job = Render(
+        return Render(
             camera=camera_text(camera), wxyz=(w, x, y, z), center=(cx, cy, cz), width=min(_width(query), camera.width)
         )
-        kind = f"render {query.get('rev')}"  # poses side by side do not push each other aside
-        return await self._picture(kind, query, job)
 
     def _camera(self, recording: str, query: Mapping[str, str]) -> Camera | None:
         return self._data.recording(recording).camera if query.get("lens") == "1" else self._data.camera(recording)
 
-    async def _picture(self, kind: str, query: Mapping[str, str], job: Frame | Render) -> bytes:
+    def _submitted(self, kind: str, query: Mapping[str, str], job: Frame | Render) -> Future[Any]:
         page = query.get("page", "")
         if not _PAGE.fullmatch(page):
             raise InputError("A page's id is letters and digits.")
@@ -84,7 +91,11 @@ class Pictures:
             key = f"{kind} {when} {page}"
             waiting = self._process.submit(job, key=key, is_later=is_ahead, is_urgent=is_quick)
             self._asked[job, when] = waiting
-        return bytes(await asyncio.wrap_future(waiting))
+        return waiting
+
+
+async def _bytes_of(picture: Future[Any]) -> bytes:
+    return bytes(await asyncio.wrap_future(picture))
 
 
 def _width(query: Mapping[str, str]) -> int:

@@ -18,7 +18,6 @@ import itertools
 import logging
 import multiprocessing
 import threading
-from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -26,7 +25,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from gazeloc_app.drawing.render_worker import Cast, Job, Sources, work
+from gazeloc_app.drawing.picture_cache import PictureCache
+from gazeloc_app.drawing.render_jobs import Cast, Job, Sources
+from gazeloc_app.drawing.render_worker import work
 from gazeloc_core.errors import GazelocError, RenderError
 
 _log = logging.getLogger(__name__)
@@ -67,7 +68,7 @@ class RenderProcess:
         self._changed = threading.Condition()
         self._waiting: list[_Waiting] = []
         self._numbers = itertools.count()
-        self._cache = _PictureCache(_CACHE_BYTES)
+        self._cache = PictureCache(_CACHE_BYTES)
         self._closed = False
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
@@ -110,8 +111,8 @@ class RenderProcess:
 
     def reopen(self) -> None:
         """Open mesh and recordings anew before the next request: they have changed, and so have all pictures."""
+        self._is_outdated = True  # before the cache: what is drawn from now on is kept, and so must be new
         self._cache.clear()
-        self._is_outdated = True
 
     @property
     def pid(self) -> int | None:
@@ -159,6 +160,7 @@ class RenderProcess:
         cached = self._cache.get(job)  # the same picture may have been drawn while this one waited
         if cached is not None:
             return cached
+        revision = self._cache.revision
         pipe = self._connected()
         try:
             pipe.send(job)
@@ -168,7 +170,7 @@ class RenderProcess:
         self._deaths_in_a_row = 0
         if not done:
             raise answer
-        self._cache.put(job, answer)
+        self._cache.put(job, answer, revision)
         return answer
 
     def _connected(self) -> Connection:
@@ -206,35 +208,3 @@ class RenderProcess:
             return Closing()
         self._on_trouble(sentence)
         return RenderError(sentence)
-
-
-class _PictureCache:
-    """The last pictures by their request, up to a number of bytes; safe to use from several threads."""
-
-    def __init__(self, max_bytes: int):
-        self._max_bytes = max_bytes
-        self._size = 0
-        self._pictures: OrderedDict[Job, bytes] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, job: Job) -> bytes | None:
-        if isinstance(job, Cast):
-            return None
-        with self._lock:
-            if job in self._pictures:
-                self._pictures.move_to_end(job)
-            return self._pictures.get(job)
-
-    def put(self, job: Job, answer: Any) -> None:
-        if not isinstance(answer, bytes):
-            return
-        with self._lock:
-            self._size += len(answer) - len(self._pictures.pop(job, b""))
-            self._pictures[job] = answer
-            while self._size > self._max_bytes:
-                self._size -= len(self._pictures.popitem(last=False)[1])
-
-    def clear(self) -> None:
-        with self._lock:
-            self._pictures.clear()
-            self._size = 0

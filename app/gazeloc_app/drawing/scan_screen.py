@@ -1,7 +1,7 @@
 """The scan as the scene draws it: a small one at once, a large one from the project, where the drawing process puts it.
 
 Clustering a million faces and packing them takes seconds and much of Python's GIL, so that it happens once per scan
-and in another process (render_worker.MakeDisplay); meanwhile the scene shows `glimpse`, some points of the surface.
+and in another process (render_jobs.MakeDisplay); meanwhile the scene shows `glimpse`, some points of the surface.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.views import ScanPrepared
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.render_jobs import MakeDisplay
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import MakeDisplay
 from gazeloc_app.state import Level
 from gazeloc_core.errors import GazelocError
 from gazeloc_core.scan import Mesh

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gazeloc_app.drawing.render_worker import SeenTags, Sources
+from gazeloc_app.drawing.render_jobs import SeenTags, Sources
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
 from gazeloc_core.stages.display import make_display

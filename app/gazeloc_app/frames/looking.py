@@ -11,8 +11,8 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.render_jobs import Frame, Photo, camera_text
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Frame, Photo, camera_text
 from gazeloc_app.frames.sightings import frame_pose
 from gazeloc_app.scene.frames import FrameInSceneLayer, look_through
 from gazeloc_app.scene_view import when_picture

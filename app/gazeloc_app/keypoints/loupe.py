@@ -15,8 +15,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.drawing.facing import place_to_stand
+from gazeloc_app.drawing.render_jobs import Frame, Render, camera_text
 from gazeloc_app.drawing.render_process import RenderProcess
-from gazeloc_app.drawing.render_worker import Frame, Render, camera_text
 from gazeloc_app.routes import Asked, Reply, Routes
 from gazeloc_app.state import AppState
 from gazeloc_core.arrays import Floats

@@ -17,6 +17,7 @@ from gazeloc_app.actions.views import CompareWith, DrawTags
 from gazeloc_app.data import ProjectData
 from gazeloc_app.frames.offset_text import offset_text
 from gazeloc_app.frames.sightings import image_of_frame
+from gazeloc_app.frames.support_text import tag_support_text, track_support_text
 from gazeloc_app.frames.timeline_html import MARK_SIGNS, timeline_html
 from gazeloc_app.panels.comparison import ComparisonHtml
 from gazeloc_app.panels.marks import MarkWidgets
@@ -108,9 +109,9 @@ class FramePanel:
         times = self._data.recording(state.recording).timestamp_ns
         seconds = (int(times[frame]) - int(times[0])) / 1e9
         facts = [f"Frame {frame} of {len(times)} · {seconds:.2f} s · {STATUS_TEXT[status]}"]
-        facts.append(self._data.tag_support(state.recording, state.annotation.method, frame))
+        facts.append(tag_support_text(self._data.tag_columns(state.recording, state.annotation.method), frame))
         if status == PoseStatus.TRACKED.value:
-            facts.append(self._data.track_support(state.recording, frame))
+            facts.append(track_support_text(self._data.tracked(state.recording), frame))
         facts += [self._score_text(state, frame), self._error_text(state, frame), state.renderer_note]
         lines = [widgets.text(fact) for fact in facts if fact]
         mark = state.annotation.marks.get(frame)

@@ -10,7 +10,6 @@ from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.surfaces.glb import lines_glb
 from gazeloc_core.surfaces.viewpoint import up_vector
 
-"""Of x, y and z; colour-blind eyes tell them apart."""
 _ABOVE_FLOOR_M = 0.005
 """So that the lines are not half in the floor."""
 

@@ -9,6 +9,7 @@ Artifacts are written beside their place and renamed, so they survive either.
 from __future__ import annotations
 
 import importlib
+import logging
 import multiprocessing
 import os
 import threading
@@ -16,7 +17,7 @@ import time
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from multiprocessing.synchronize import Event
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from gazeloc_app.work.remaining import Remaining
 from gazeloc_core.errors import Cancelled, GazelocError
 from gazeloc_core.progress import Report
 
+_log = logging.getLogger(__name__)
 PATIENCE_S = 5.0
 _REPORT_INTERVAL_S = 0.1
 
@@ -42,8 +44,10 @@ class JobRunner:
         self._busy = threading.Lock()
         self._starting = threading.Lock()
         self._context = multiprocessing.get_context("spawn")
-        self._cancel: Event = self._context.Event()
-        self._process: Any = None
+        self._cancel: Any = self._context.RawValue("b", 0)
+        """1 once the running task is asked to stop. A byte and no Event: an Event has a lock, which a worker that is
+        killed while it looks would keep for ever."""
+        self._process: BaseProcess | None = None
         self._connection: Connection | None = None
 
     def warm_up(self) -> None:
@@ -54,13 +58,13 @@ class JobRunner:
         """Begin a task; the store sees to it that there is one at a time."""
         if not self._busy.acquire(blocking=False):
             raise RuntimeError("a job is under way")
-        self._cancel.clear()
+        self._cancel.value = 0
         threading.Thread(target=self._watch, args=(name, task, keywords), name="gazeloc-job", daemon=True).start()
 
     def cancel(self) -> None:
         """Ask the running task to stop; it is ended if it does not answer in time."""
         if self._busy.locked():
-            self._cancel.set()
+            self._cancel.value = 1
 
     def stop(self) -> None:
         """End the worker process."""
@@ -77,6 +81,10 @@ class JobRunner:
         except (OSError, EOFError):
             self.stop()
             ended = self._died(name)
+        except Exception as error:  # the next job must be able to run, whatever a bug of ours does to this one
+            _log.exception("watching the job %s", name)
+            self.stop()
+            ended = JobEnded(Level.ERROR, f"A fault in GazeLoc stopped this: {type(error).__name__}: {error}.")
         finally:
             self._busy.release()
         job_log.add(f"{ended.level.value}: {ended.text}")
@@ -100,16 +108,17 @@ class JobRunner:
                     return JobEnded(Level.INFO, f"“{name}” was cancelled; what was there before is unchanged.")
                 else:
                     return JobEnded(Level.ERROR, value)
-            if self._cancel.is_set():
+            if self._cancel.value:
                 asked_at = asked_at or time.monotonic()
                 if time.monotonic() - asked_at > PATIENCE_S:
                     self.stop()
                     return JobEnded(Level.INFO, f"“{name}” was ended; what was there before is unchanged.")
-            if not self._process.is_alive() and not connection.poll():
+            process = self._process
+            if (process is None or not process.is_alive()) and not connection.poll():
                 raise EOFError
 
     def _died(self, name: str) -> JobEnded:
-        if self._cancel.is_set():
+        if self._cancel.value:
             return JobEnded(Level.INFO, f"“{name}” was ended; what was there before is unchanged.")
         return JobEnded(
             Level.ERROR,
@@ -129,7 +138,7 @@ class JobRunner:
             return self._connection
 
 
-def _serve(connection: Connection, cancel: Event, folder: Path, parent: int) -> None:
+def _serve(connection: Connection, cancel: Any, folder: Path, parent: int) -> None:
     if hasattr(os, "nice"):
         os.nice(5)  # scrubbing through frames goes first
     importlib.import_module("gazeloc_app.work.tasks")  # takes seconds: now, not when the first task comes
@@ -158,11 +167,11 @@ def _answer(task: Task, folder: Path, report: Report, keywords: dict[str, Any]) 
         return "failed", f"A fault in GazeLoc stopped this: {type(error).__name__}: {error}."
 
 
-def _report_to(connection: Connection, cancel: Event, parent: int) -> Report:
+def _report_to(connection: Connection, cancel: Any, parent: int) -> Report:
     last = [0.0]
 
     def report(fraction: float, text: str = "", /) -> None:
-        if cancel.is_set() or os.getppid() != parent:
+        if cancel.value or os.getppid() != parent:
             raise Cancelled("Cancelled.")
         now = time.monotonic()
         if now - last[0] > _REPORT_INTERVAL_S or fraction >= 1:
