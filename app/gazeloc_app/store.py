@@ -110,12 +110,13 @@ class Store:
             earlier = self._state
             self._apply(action)
             if self._state.recording != earlier.recording:  # what was decided about the one that is left is saved first
-                self._run_all([*self._savers, *self._effects], before, earlier)
+                self._save(before, earlier)
+                self._run_effects(before, earlier)
                 before = self._state
-        self._run_all(self._savers, before, self._state)
+        self._save(before, self._state)
         self._render()
         shown = self._state
-        self._run_all(self._effects, before, shown)
+        self._run_effects(before, shown)
         if self._state is not shown:
             self._render()
 
@@ -129,15 +130,21 @@ class Store:
             self._state = self._state.noticed(Level.ERROR, f"A fault in GazeLoc stopped this action: {error}.")
         self.applied += 1
 
-    def _run_all(self, effects: list[Effect], before: AppState, after: AppState) -> None:
+    def _save(self, before: AppState, after: AppState) -> None:
+        self._run_all(self._savers, before, after, "This was not saved")
+
+    def _run_effects(self, before: AppState, after: AppState) -> None:
+        self._run_all(self._effects, before, after, "A fault in GazeLoc stopped what should have followed")
+
+    def _run_all(self, effects: list[Effect], before: AppState, after: AppState, failed: str) -> None:
         for effect in effects:
             try:
                 effect(before, after)
             except GazelocError as error:
                 self._state = self._state.noticed(Level.ERROR, str(error))
             except Exception as error:
-                log.exception("the effects of an action")
-                self._state = self._state.noticed(Level.ERROR, f"This was not saved: {error}.")
+                log.exception("after an action")
+                self._state = self._state.noticed(Level.ERROR, f"{failed}: {error}.")
 
     def _render(self) -> None:
         with self._batch():

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gazeloc_core.camera import Camera
+from gazeloc_core.errors import ProjectError
 from gazeloc_core.gaze import GazeInScan
 from gazeloc_core.project import Project
 from gazeloc_core.readers import open_recording, open_scan
@@ -147,31 +148,34 @@ def sfm_models(project: Project, recording: str) -> Artifact:
 
 
 def load_sfm_model(project: Project, recording: str, rank: int = 0) -> SfmModel:
-    """The largest model that the method `sfm` places (`rank` 0) or a smaller one, joined to the recording's frames."""
-    artifact = sfm_models(project, recording)
-    return _model(artifact, rank, artifact.header().content)
+    """The largest model that the method `sfm` places (`rank` 0) or a smaller one, joined to the recording's frames.
+
+    Raises:
+        ProjectError: if there is none, or none of that rank any more.
+    """
+    models = load_sfm_models(project, recording)
+    if rank >= len(models):
+        raise ProjectError(
+            f"{recording}: the reconstruction has no piece {rank + 1} any more, it was made anew; run `gazeloc run`."
+        )
+    return models[rank]
 
 
 def load_sfm_models(project: Project, recording: str) -> list[SfmModel]:
     """All models that the method `sfm` places, the largest first."""
-    return _models(sfm_models(project, recording))
+    artifact = sfm_models(project, recording)
+    return list(_models(artifact, artifact.header().content))
 
 
 def load_model(project: Project, recording: str) -> SfmModel:
     """The reconstruction's largest model as it came, joined to the recording's frames."""
-    artifact = project.artifact(recording, "reconstruction")
-    return _model(artifact, 0, artifact.header().content)
+    return load_models(project, recording)[0]
 
 
 def load_models(project: Project, recording: str) -> list[SfmModel]:
     """All models of the reconstruction as they came, the largest first."""
-    return _models(project.artifact(recording, "reconstruction"))
-
-
-def _models(artifact: Artifact) -> list[SfmModel]:
-    content = artifact.header().content
-    count = sum(name.endswith("_image_names") for name in artifact.read_arrays())
-    return [_model(artifact, rank, content) for rank in range(count)]
+    artifact = project.artifact(recording, "reconstruction")
+    return list(_models(artifact, artifact.header().content))
 
 
 def model_arrays(models: list[SfmModel]) -> dict[str, Any]:
@@ -227,9 +231,14 @@ def _open_recording(path: Path, content: str) -> Recording:
 
 
 @_keep_last
-def _model(artifact: Artifact, rank: int, content: str) -> SfmModel:
+def _models(artifact: Artifact, content: str) -> tuple[SfmModel, ...]:
     del content
     arrays = artifact.read_arrays()
+    count = sum(name.endswith("_image_names") for name in arrays)
+    return tuple(_model_from_arrays(arrays, rank) for rank in range(count))
+
+
+def _model_from_arrays(arrays: dict[str, Any], rank: int) -> SfmModel:
     prefix = f"{rank}_"
     columns = {name[len(prefix) :]: column for name, column in arrays.items() if name.startswith(prefix)}
     cameras = json.loads(str(columns.pop("cameras")))

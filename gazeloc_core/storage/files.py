@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,13 +26,27 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
     the new name with nothing in it, or bring the old file back.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
+    with replacement_of(path) as part:
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
     flush_folder(path.parent)
+
+
+@contextmanager
+def replacement_of(path: Path) -> Iterator[Path]:
+    """A file beside `path` to write and put in its place; another one for every process and thread, gone if that fails.
+
+    Leftovers of a process that was killed meanwhile are `settle_folders`' to clear.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.part")
+    try:
+        yield part
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def flush_folder(folder: Path) -> None:

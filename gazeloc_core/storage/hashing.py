@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gazeloc_core.errors import InputError
+from gazeloc_core.storage.files import replacement_of
 
 _CHUNK = 1 << 20
 DIGITS = 16
@@ -30,7 +31,7 @@ class FileHasher:
         self._has_news = False
         try:
             self._known = dict(json.loads(memory.read_text()))
-        except (OSError, ValueError):
+        except (OSError, ValueError, TypeError):
             self._known = {}  # a memory that cannot be read costs time, nothing else
 
     def hash_of(self, path: Path) -> str:
@@ -52,9 +53,9 @@ class FileHasher:
             return
         try:
             self._memory.parent.mkdir(parents=True, exist_ok=True)
-            part = self._memory.with_suffix(".part")
-            part.write_text(json.dumps(self._known))
-            part.replace(self._memory)
+            with replacement_of(self._memory) as part:
+                part.write_text(json.dumps(self._known))
+                part.replace(self._memory)
         except OSError:
             return  # hashes are only remembered to save time
 

@@ -133,6 +133,20 @@ def test_actions_from_many_threads_are_all_applied():
     assert store.applied == 2000
 
 
+def test_a_fault_says_whether_it_kept_something_from_being_saved():
+    def fail(before: AppState, after: AppState) -> None:
+        raise ZeroDivisionError("a fault")
+
+    said = []
+    for add in (Store.add_saver, Store.add_effect):
+        store = Store(fresh())
+        add(store, fail)
+        store.dispatch(SelectPair(None))
+        store.step()
+        said.append(store.state.notice.text)
+    assert said == ["This was not saved: a fault.", "A fault in GazeLoc stopped what should have followed: a fault."]
+
+
 def test_views_see_each_batch_and_effects_its_two_ends():
     store, seen, effects = Store(fresh()), [], []
     store.add_view(lambda state: seen.append(state.frame))

@@ -6,6 +6,7 @@ import random
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -100,6 +101,28 @@ def test_a_file_is_flushed_before_its_name_and_the_name_before_it_is_said(tmp_pa
     monkeypatch.setattr(Path, "replace", lambda self, target: (done.append("rename"), replace(self, target))[1])
     write_text_atomically(tmp_path / "a.txt", "text")
     assert done == ["fsync", "rename", "fsync"]
+
+
+def test_threads_that_write_one_file_at_the_same_time_each_write_it_whole(tmp_path):
+    path = tmp_path / "a.txt"
+    texts = [letter * 200_000 for letter in "abcd"]
+    with ThreadPoolExecutor(4) as pool:
+        for _ in range(5):
+            list(pool.map(lambda text: write_text_atomically(path, text), texts))
+            assert path.read_text() in texts
+    assert [left.name for left in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one_and_nothing_beside_it(tmp_path, monkeypatch):
+    write_text_atomically(tmp_path / "a.txt", "old")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_text_atomically(tmp_path / "a.txt", "new")
+    assert [(left.name, left.read_text()) for left in tmp_path.iterdir()] == [("a.txt", "old")]
 
 
 def test_a_folder_whose_replacement_was_killed_between_its_two_renames_comes_back(tmp_path):

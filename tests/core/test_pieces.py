@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from box_room import PINHOLE, Room, make_room, true_tag_corners
+from fake_project import make_project
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.bending.pieces import Piece, place_pieces
+from gazeloc_core.errors import ProjectError
 from gazeloc_core.sfm_model import SfmModel
+from gazeloc_core.stages import inputs
 from gazeloc_core.tag_types import TagCorners, TagSightings
 from gazeloc_core.transforms import Similarity
 
@@ -103,3 +106,10 @@ def test_a_single_far_tag_does_not_place_a_piece(room: Room):
     answer = placed(room, piece_of(room, range(40), ELSEWHERE), seen, alone)
     assert answer.alignment is None
     assert f"shows tag {tag}, but its alignment is not to be trusted" in answer.reason
+
+
+def test_a_piece_that_an_earlier_reconstruction_had_is_a_sentence(tmp_path):
+    project = make_project(tmp_path)
+    assert len(inputs.load_sfm_model(project, "walk")) > 0
+    with pytest.raises(ProjectError, match="walk: the reconstruction has no piece 3 any more"):
+        inputs.load_sfm_model(project, "walk", rank=2)
