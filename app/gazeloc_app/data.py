@@ -77,6 +77,12 @@ class ProjectData:
         colored = self._read("mesh", self.project.scan_artifact("colors"), lambda: inputs.load_mesh(self.project))
         return colored or self.scan().mesh
 
+    @property
+    def scan_revision(self) -> str:
+        """Tells the scan with the colours that it has now from the one without."""
+        stamp = self.project.scan_artifact("colors").result_stamp
+        return "0" if stamp is None else f"{stamp[0]:x}"
+
     def raycaster(self) -> Raycaster:
         """Single rays against the scan's mesh, prepared without holding Python's GIL for long."""
         return self._remember("raycaster", None, lambda: Raycaster(self.scan().mesh, FACES_PER_TREE))

@@ -10,6 +10,7 @@ from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowFrame
 from gazeloc_app.app import App
+from gazeloc_app.drawing.pictures import render_url
 from gazeloc_app.panels.comparison import NO_POSE, NO_POSES
 from gazeloc_app.panels.frames import FramePanel
 
@@ -46,7 +47,7 @@ def test_the_page_is_told_which_frames_have_a_pose(app, project):
     alignment = align_keypoints(project, "walk")
     step(app, ChooseAlignment(alignment.key), ShowFrame(3))
     box, trajectory = said(app), app.data.trajectory("walk", alignment.key)
-    assert box["render"] == f"/renders/walk/{{}}.jpg?rev={alignment.key}"
+    assert box["render"] == render_url(app.data, "walk", alignment.key, "{}")
     bits = [int(bit) for digit in box["poses"] for bit in f"{int(digit, 16):04b}"]
     np.testing.assert_array_equal(bits[: len(trajectory)], trajectory.has_pose)
     assert (box["number"], box["last"]) == ("3", str(len(trajectory) - 1))

@@ -2,12 +2,14 @@
 
 import asyncio
 import threading
+import time
 
 import pytest
-from gazeloc_app.drawing.pictures import QUICK_PX, WIDTH_PX, Pictures
+from gazeloc_app.drawing.pictures import QUICK_PX, WIDTH_PX, Pictures, render_url
 from gazeloc_app.drawing.render_process import RenderProcess, Superseded
 
 from gazeloc_core.errors import InputError
+from gazeloc_core.stages.registration import align_keypoints
 
 
 def test_pages_that_ask_for_the_same_frame_share_it_and_others_do_not_push_it_aside(app, monkeypatch):
@@ -92,3 +94,41 @@ def test_quick_pictures_come_before_those_in_full_and_neighbours_last(app, monke
 def test_a_page_that_gives_itself_a_strange_name_gets_no_picture(app):
     with pytest.raises(InputError, match="letters and digits"):
         asyncio.run(Pictures(app.data, None).frame("walk", 1, {"page": "a/b"}))
+
+
+def test_poses_that_are_long_in_coming_hold_the_page_up_and_not_the_loop_and_the_last_wish_counts(app, monkeypatch):
+    key = align_keypoints(app.project, "walk").key
+    app.data.trajectory("walk", key)
+    drawn, plain, asked = [], app.data.trajectory, []
+
+    def slow_at_first(recording, key):
+        asked.append(key)
+        if len(asked) == 1:
+            time.sleep(0.3)
+        return plain(recording, key)
+
+    monkeypatch.setattr(app.data, "trajectory", slow_at_first)
+    monkeypatch.setattr(RenderProcess, "_answer", lambda self, job: drawn.append(job) or repr(job.center).encode())
+    process = RenderProcess(None)
+    pictures = Pictures(app.data, process)
+
+    async def browse():
+        both = [asyncio.create_task(pictures.render("walk", frame, {"rev": key, "page": "a"})) for frame in (3, 5)]
+        naps = 0
+        while len(drawn) == 0:
+            await asyncio.sleep(0.01)
+            naps += 1
+        return naps, await asyncio.gather(*both, return_exceptions=True)
+
+    naps, answers = asyncio.run(browse())
+    process.close()
+    assert naps > 5
+    assert answers[1] == repr(drawn[-1].center).encode()
+
+
+def test_a_scan_that_got_colours_has_other_renders(app):
+    before = render_url(app.data, "walk", "abc", 3)
+    assert before.startswith("/renders/walk/3.jpg?rev=abc&")
+    assert render_url(app.data, "walk", "abc", 3) == before
+    app.project.scan_artifact("colors").write_arrays({}, options={}, inputs={})
+    assert render_url(app.data, "walk", "abc", 3) != before

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
+from urllib.parse import quote
 
 from gazeloc_app.data import ProjectData
 from gazeloc_app.drawing.render_jobs import Frame, Render, camera_text
@@ -25,6 +26,11 @@ _PAGE = re.compile(r"[a-z0-9]{0,40}")
 _KEY = re.compile(rf"[0-9a-f]{{1,64}}|({'|'.join(Method)})@[0-9a-f-]{{1,64}}")
 
 
+def render_url(data: ProjectData, recording: str, key: str, frame: int | str) -> str:
+    """Where `Pictures.render` is: another URL for other poses and other colours of the scan, as browsers keep it."""
+    return f"/renders/{quote(recording)}/{frame}.jpg?rev={quote(key)}&scan={data.scan_revision}"
+
+
 class Pictures:
     """Asks the drawing process, so that of all frames that a page was scrubbed over only the last is drawn.
 
@@ -35,7 +41,7 @@ class Pictures:
 
     def __init__(self, data: ProjectData, process: RenderProcess):
         self._data, self._process = data, process
-        self._asked: dict[tuple[Frame | Render, str], Future[Any]] = {}
+        self._asked: dict[tuple[Frame | Render, str, str], Future[Any]] = {}
         self._turn = asyncio.Lock()
 
     async def frame(self, recording: str, index: int, query: Mapping[str, str]) -> bytes:
@@ -85,12 +91,13 @@ class Pictures:
             raise InputError("A page's id is letters and digits.")
         is_quick, is_ahead = query.get("quick") == "1", query.get("ahead") == "1"
         when = "ahead" if is_ahead else "quick" if is_quick else "now"
-        waiting = self._asked.get((job, when))
+        same = (job, when, query.get("scan", ""))
+        waiting = self._asked.get(same)
         if waiting is None or waiting.done():
             self._asked = {asked: future for asked, future in self._asked.items() if not future.done()}
             key = f"{kind} {when} {page}"
             waiting = self._process.submit(job, key=key, is_later=is_ahead, is_urgent=is_quick)
-            self._asked[job, when] = waiting
+            self._asked[same] = waiting
         return waiting
 
 

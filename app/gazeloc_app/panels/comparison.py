@@ -17,6 +17,7 @@ from viser import GuiApi
 from gazeloc_app import widgets
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.pictures import render_url
 from gazeloc_app.frames.frame_marks import marks_in_frame
 from gazeloc_app.frames.gaze_at import gaze_as_recorded, gaze_in_frame
 from gazeloc_app.panels.marks_svg import marks_svg
@@ -108,7 +109,7 @@ class ComparisonHtml:
         trajectory = None if key is None else self._data.trajectory(recording, key)
         if key is None or trajectory is None:
             return "", ""
-        url = f"/renders/{quote(recording)}/{{}}.jpg?rev={quote(key)}"
+        url = render_url(self._data, recording, key, "{}")
         return url, np.packbits(trajectory.has_pose).tobytes().hex()
 
     def _shapes(self, state: AppState, frame: int) -> dict[str, str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 from viser import GuiApi
@@ -15,6 +14,7 @@ from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.choices import ChooseMethod, CompareMethod
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.pictures import render_url
 from gazeloc_app.palette import hexadecimal
 from gazeloc_app.state import AppState
 from gazeloc_app.work import tasks
@@ -122,7 +122,7 @@ class MethodPanel:
         trajectory = self._data.trajectory(state.recording, key)
         has_pose = trajectory is not None and state.frame < len(trajectory) and trajectory.pose(state.frame) is not None
         caption = widgets.text(method.value) + ("" if has_pose else ": no pose")
-        url = f"/renders/{quote(state.recording)}/{state.frame}.jpg?rev={quote(key or '')}"
+        url = render_url(self._data, state.recording, key or "", state.frame)
         picture = f'<img alt="{widgets.text(method)}" src="{widgets.text(url)}" style="width:100%">' if has_pose else ""
         return f'<div style="display:inline-block;width:49%;vertical-align:top;margin:1px">{caption}<br>{picture}</div>'
 
