@@ -11,7 +11,7 @@ recording see of that is known once they are compared together (`scan_distortion
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -44,6 +44,10 @@ class AgreementOptions:
     """The offset in the picture that halves the score, however little the tiles tell about the motion."""
     follow_deg: float = 0.5
     """A tile follows the camera's motion that is left no more than this from it."""
+    vague_m: float = 0.3
+    """An offset whose standard deviation is larger is not told."""
+    vague_deg: float = 10.0
+    """The same of turns."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,10 @@ class Agreement:
     tiles. `shift_m` and `turn_deg` are how far off the camera looks, each with its standard deviation, the scatter of
     true poses on good scans included. `scan_shift_m` is how much further or less off it would look if what all frames
     see of the scan's own distortion were held against it; 0 where that is not known.
+
+    All but the score are NaN where less than half of the tiles move as one, or where they hardly tell the motion: a
+    camera that is off by much more than tiles are looked for looks off by a few centimetres in any direction, and that
+    is no measurement.
     """
 
     score: float
@@ -111,15 +119,17 @@ def agreement(equations: TileEquations, distortion: ScanDistortion | None, optio
     follows = motion.left * equations.px_deg < options.follow_deg
     share = float(np.average(follows, weights=equations.weight))
     is_explained = min(1.0, 2 * share)  # the motion is to be believed where half of the tiles follow it
+    offset_deg = float(np.median(np.linalg.norm(equations.picture_deg @ motion.value, axis=1)))
+    score = is_explained / (1 + max(length / options.half_at, offset_deg / options.half_picture_deg) ** 2)
     shift_m, shift_sigma_m = _length(motion.value[3:], scatter[3:, 3:])
     turn, turn_sigma = _length(motion.value[:3], scatter[:3, :3])
+    if is_explained < 1 or shift_sigma_m > options.vague_m or np.degrees(turn_sigma) > options.vague_deg:
+        return replace(UNKNOWN, score=score)
     scan_shift_m = 0.0
     if of_scan is not None:
         scan_shift_m = float(np.linalg.norm(apparent_motion(equations).value[3:] - motion.value[3:]))
-    offset_deg = float(np.median(np.linalg.norm(equations.picture_deg @ motion.value, axis=1)))
-    off = max(length / options.half_at, offset_deg / options.half_picture_deg)
     return Agreement(
-        is_explained / (1 + off**2),
+        score,
         offset_deg,
         shift_m,
         shift_sigma_m,

@@ -27,14 +27,15 @@ from gazeloc_core.storage.artifacts import Artifact, State
 from gazeloc_core.storage.hashing import hash_of_value
 from gazeloc_core.trajectory import Trajectory
 
-FORMULA = "2"
-"""Changes whenever the same frames get other scores."""
+FORMULA = "3"
+"""Changes whenever the same frames get other scores or offsets."""
 _COMPARED_FRAMES = 300
 
 
 @dataclass(frozen=True, eq=False)
 class FrameScores:
-    """Of all N frames, NaN where there is no pose or nothing to compare: see `agreement.Agreement`."""
+    """Of all N frames, NaN where there is no pose or nothing to compare, all but the score also where the offset cannot
+    be told: see `agreement.Agreement`."""
 
     score: Floats
     offset_deg: Floats

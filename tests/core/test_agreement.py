@@ -54,6 +54,7 @@ def test_another_place_of_the_room_does_not_agree(scorer, frame):
     away = RigidTransform.from_components([0.4, 0.2, 0.3], Rotation.from_rotvec([0.2, 0.9, 0.1]))
     found = scorer.score(frame, POSE * away)
     assert not found.score > 0.2
+    assert np.isnan([found.shift_m, found.turn_deg, found.offset_deg]).all()  # a few centimetres, it would say
 
 
 def test_a_frame_that_shows_nothing_has_no_score(scorer, frame):

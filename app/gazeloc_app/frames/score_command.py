@@ -82,17 +82,26 @@ def _rows(one: _Scored, frames: list[int]) -> list[list[str]]:
                 str(frame),
                 f"{(int(times[frame]) - int(times[0])) / 1e9:.2f}",
                 f"{one.scores.score[frame]:.2f}",
-                f"{100 * one.scores.shift_m[frame]:.1f}",
-                f"{100 * one.scores.shift_sigma_m[frame]:.1f}",
-                f"{one.scores.turn_deg[frame]:.2f}",
-                f"{one.scores.turn_sigma_deg[frame]:.2f}",
-                f"{100 * one.scores.scan_shift_m[frame]:.1f}",
+                _cell(100 * one.scores.shift_m[frame], 1),
+                _cell(100 * one.scores.shift_sigma_m[frame], 1),
+                _cell(one.scores.turn_deg[frame], 2),
+                _cell(one.scores.turn_sigma_deg[frame], 2),
+                _cell(100 * one.scores.scan_shift_m[frame], 1),
                 str(one.trajectory.status[frame]),
                 "" if mark is None else mark.mark.value,
                 "" if mark is None else mark.note,
             ]
         )
     return rows
+
+
+def _cell(value: float, digits: int) -> str:
+    """A number, or a dash where it cannot be told."""
+    return f"{value:.{digits}f}" if np.isfinite(value) else "–"
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _json(one: _Scored, worst: int) -> dict[str, Any]:
@@ -107,7 +116,7 @@ def _json(one: _Scored, worst: int) -> dict[str, Any]:
             {
                 "frame_index": frame,
                 "timestamp_ns": int(one.trajectory.timestamp_ns[frame]),
-                **{name: float(values[frame]) for name, values in columns.items()},
+                **{name: _or_none(values[frame]) for name, values in columns.items()},
             }
             for frame in one.worst(worst)
         ],

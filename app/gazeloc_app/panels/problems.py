@@ -136,7 +136,7 @@ def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | No
 def _row(state: AppState, table: FrameTable, scores: FrameScores | None, errors: FrameErrors | None, frame: int) -> str:
     facts = [f"<b>Frame {frame}</b>"]
     if scores is not None and np.isfinite(scores.score[frame]):
-        facts.append(f"agreement {scores.score[frame]:.2f}, looks {short_offset_text(scores, frame)} off")
+        facts.append(f"agreement {scores.score[frame]:.2f}, looks {short_offset_text(scores, frame)}")
     if errors is not None and np.isfinite(errors.position_m[frame]):
         facts.append(f"error {100 * errors.position_m[frame]:.1f} cm, {errors.rotation_deg[frame]:.2f}°")
     if not table.has_pose[frame]:
