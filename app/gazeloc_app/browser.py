@@ -120,6 +120,8 @@ class Browser:
         """Follow the frame slider while looking through a camera of the recording; show the keypoints in it."""
         self.looking.follow(state)
         self._controls.render(state)
+        is_selected = state.selected_key is not None and state.annotation.keypoints.get(state.selected_key) is not None
+        widgets.set_property(self._move, "visible", is_selected)
 
     def _add_widgets(self) -> None:
         gui = self._client.gui
@@ -132,7 +134,7 @@ class Browser:
         )
         sets_points = bool(self._state().recordings)
         self._move = gui.add_checkbox(
-            "Move point", False, visible=sets_points, hint="The click moves the selected pair's point."
+            "Move point", False, visible=False, hint="The next click moves the selected pair's point."
         )
         self._snap = gui.add_checkbox(
             "Snap to tags", True, visible=sets_points, hint="A click near a tag's centre or corner means that."

@@ -14,7 +14,12 @@ def to_plotly(drawing: Drawing) -> go.Figure:
     if isinstance(drawing, HeatMap):
         figure.add_trace(
             go.Heatmap(
-                x=drawing.x, y=drawing.y, z=drawing.values, colorbar={"title": drawing.z_label}, hoverongaps=False
+                x=drawing.x,
+                y=drawing.y,
+                z=drawing.values,
+                colorscale="Viridis",
+                colorbar={"title": drawing.z_label},
+                hoverongaps=False,
             )
         )
     else:

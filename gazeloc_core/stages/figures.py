@@ -148,7 +148,7 @@ def error_chart(views: TagViews, analysis: SolverAnalysis, tag: int) -> Chart:
         Series("distance error [cm]", frame, 100 * analysis.distance_error_m[mine], "points"),
         Series("estimated distance [m]", frame, analysis.distance_m[mine], "points"),
     )
-    return Chart(f"Figure 5, {views.device}, tag {tag}", "frame", "", series)
+    return Chart(f"Figure 5, {views.device}, tag {tag}", "frame", "error [cm], distance [m]", series)
 
 
 def angle_chart(views: TagViews, analysis: SolverAnalysis, tag: int) -> Chart:

@@ -14,6 +14,7 @@ from app_steps import step, stop
 from gazeloc_app import looks
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.jobs import CancelJob, JobEnded, StartJob
+from gazeloc_app.actions.pairs import SelectPair
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.app import App
 from gazeloc_app.data import ProjectData
@@ -83,6 +84,18 @@ def test_so_does_what_is_in_our_own_html(app, monkeypatch):
     silent = [tag for tag in found if not re.search(r'(title|aria-label)="[^"]+"', tag)]
     assert [tag for tag in silent if not any(name in tag for name in labelled)] == []
     step(app, *(CancelJob(number) for number in (1, 2)), JobEnded(Level.INFO, "done"), Undo())
+
+
+def test_moving_a_point_is_offered_while_a_pair_is_selected(app):
+    def look(client):
+        browser, offered = app._browsers[client.client_id], []
+        for action in (SelectPair(None), PickPoint(Side.SCAN, (1, 2, 0.5)), Undo()):
+            step(app, action)
+            browser.render(app.store.state)
+            offered.append(browser._move.visible)
+        return offered
+
+    assert while_connected(app, look) == [False, True, False]
 
 
 def test_every_command_is_in_the_help_with_its_key(app):

@@ -91,7 +91,7 @@ def test_a_part_of_the_strip_shows_its_worst_or_what_most_of_it_is(part, shown):
 
 
 def test_a_recording_without_anything_has_a_timeline_too():
-    assert "none 3" in timeline_html(None, np.full(3, np.nan), None, FrameMarks())
+    assert "no pose 3" in timeline_html(None, np.full(3, np.nan), None, FrameMarks())
 
 
 @pytest.fixture

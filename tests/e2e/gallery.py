@@ -1,11 +1,13 @@
 """Pictures of every panel in every look, to be looked at: python tests/e2e/gallery.py PROJECT OUT
 
-A picture per tab of a finished project at 1280x800 in light and dark, and on a tablet, flat and upright; then of the
-same project before anything was run, where panels say what to do first. The project is copied and left as it was.
+A picture per tab of a finished project at 1280x800 and 1440x900 in the light, in the dark, on a tablet, flat and
+upright, and with the colours for colour-blind eyes; then of the same project before anything was run, where panels say
+what to do first. The project is copied and left as it was.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import tempfile
@@ -19,18 +21,27 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent), str(TESTS.parent / "app")]
 
 from e2e.app_page import AppPage  # noqa: E402
 from e2e.page import ViewerPage, chromium_path, launch  # noqa: E402
+from gazeloc_app.actions.views import UseSafeColors  # noqa: E402
 from gazeloc_app.app import App  # noqa: E402
 from playwright.sync_api import Browser, sync_playwright  # noqa: E402
 
 from gazeloc_core.project import Project  # noqa: E402
 
-LOOKS = {"light": (1280, 800), "wide": (1440, 900), "dark": (1280, 800), "flat": (1180, 820), "upright": (820, 1180)}
+LOOKS = {
+    "light": (1280, 800),
+    "wide": (1440, 900),
+    "dark": (1280, 800),
+    "flat": (1180, 820),
+    "upright": (820, 1180),
+    "safe": (1280, 800),
+}
 
 
 def main(folder: Path, out: Path, only: tuple[str, ...]) -> None:
     """Take all pictures, or only of the named looks (of LOOKS, and "empty")."""
     out.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as work:
+        os.environ["XDG_CONFIG_HOME"] = work  # the colours that are tried are nobody's own settings
         browser = launch(playwright, chromium_path() or "chromium")
         copy = Path(shutil.copytree(folder, Path(work) / "studio"))
         with _app(folder, copy) as app:
@@ -60,6 +71,7 @@ def _app(folder: Path, copy: Path) -> Iterator[App]:
 
 
 def _shoot_tabs(browser: Browser, app: App, size: tuple[int, int], out: Path, look: str) -> None:
+    app.store.dispatch(UseSafeColors(look == "safe"))
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     viewer = ViewerPage(page)
     viewer.open(app.address).wait_until_drawn(100)

@@ -1,5 +1,6 @@
 """The app's looks in a real browser: the dark that a browser remembers, and panels that fit."""
 
+import numpy as np
 import pytest
 from app_project import make_app_project
 from e2e.app_page import AppPage
@@ -9,6 +10,12 @@ pytestmark = pytest.mark.e2e
 SCHEME = "() => document.documentElement.getAttribute('data-mantine-color-scheme')"
 LOGO = "() => document.querySelector('img[alt=GazeLoc]').naturalWidth"
 CANVAS = "() => window.__viserMutable.canvas.getBoundingClientRect().width"
+
+TABS = """() => {
+  const tabs = [...document.querySelectorAll('[role=tablist]')].find((list) => list.children.length === 8).children;
+  const boxes = Array.from(tabs, (tab) => tab.getBoundingClientRect());
+  return boxes.map((box) => [box.left, box.top, box.width].map(Math.round));
+}"""
 
 
 @pytest.fixture
@@ -25,6 +32,10 @@ def test_the_dark_is_remembered_and_a_tablet_keeps_room_for_the_scene(app, open_
     assert viewer.page.evaluate(LOGO) > 0
     assert viewer.page.evaluate(SCHEME) == "light"
     viewer.wait_until(lambda: viewer.page.evaluate(CANVAS) > 330)
+    left, top, width = np.array(viewer.page.evaluate(TABS)).T
+    assert len(set(left)) == 4, "eight tabs in two rows of four, all of one width"
+    assert len(set(top)) == 2
+    np.testing.assert_allclose(width, width[0], atol=1)
     page.tab("Help").press("Light or dark")
     viewer.wait_until(lambda: viewer.page.evaluate(SCHEME) == "dark")
     viewer.open(app.address).wait_until_drawn(300)

@@ -26,7 +26,7 @@ STATUS_NAMES = {
     PoseStatus.INTERPOLATED.value: "interpolated",
     PoseStatus.TAG_ONLY.value: "tag only",
     PoseStatus.REJECTED.value: "rejected",
-    PoseStatus.NONE.value: "none",
+    PoseStatus.NONE.value: "no pose",
 }
 MARK_COLORS = {mark: hexadecimal(color) for mark, color in MARKS.items()}
 MARK_SIGNS = {Mark.GOOD: "✓", Mark.BAD: "✗", Mark.UNSURE: "?"}

@@ -35,6 +35,7 @@ NONE_YET = (
     "The reconstruction stands in the middle of the scan until it has one. Tags that both saw, or three keypoints, "
     "make one: press Align."
 )
+NO_MODEL = "There is no reconstruction to align yet: “Run everything” in the tab Project makes it and aligns it."
 
 
 class AlignmentPanel:
@@ -89,7 +90,8 @@ class AlignmentPanel:
 
     def _evidence_html(self, state: AppState, chosen: Alignment | None) -> str:
         if chosen is None:
-            how = meanwhile(state, tasks.run_all, tasks.align) or NONE_YET
+            none_yet = NO_MODEL if self._data.model(state.recording) is None else NONE_YET
+            how = meanwhile(state, tasks.run_all, tasks.align) or none_yet
             return widgets.card("No alignment yet.", how)
         before = self._data.alignment(state.recording, chosen.parent)
         columns = [("", chosen)] if before is None else [("before", before), ("after", chosen)]

@@ -59,7 +59,7 @@ class HelpPanel:
         commands = {row[1]: row for gui in guis for row in commands_of(gui)}
         parts = [
             "<b>Mouse</b>" + _table(MOUSE),
-            "<b>Keys</b>" + _table(sorted(commands.values(), key=lambda row: row[1])),
+            "<b>Keys</b>" + _table(sorted(commands.values(), key=_order)),
             f"<b>Undo</b><br>{widgets.text(UNDONE)}<br>",
             "<b>Words</b>" + _table(WORDS, is_key=False),
         ]
@@ -70,6 +70,12 @@ def commands_of(gui: GuiApi) -> list[tuple[str, str]]:
     """Key and meaning of every command that was registered; a dash for those without a key."""
     handles: Iterable[Any] = tuple(gui._command_handle_from_uuid.values())
     return [(_keys(handle), f"{handle.label}{_more(handle)}") for handle in handles]
+
+
+def _order(row: tuple[str, str]) -> tuple[bool, bool, str]:
+    """Single keys by what they do, then the eight arrows, then what has no key."""
+    key, meaning = row
+    return key == "–", any(arrow in key for arrow in NAMES.values()), meaning
 
 
 def _keys(command: Any) -> str:

@@ -12,6 +12,7 @@ from gazeloc_app import widgets
 from gazeloc_app.actions.action import Action
 from gazeloc_app.actions.views import ShowLayer, TintLayer, UseSafeColors
 from gazeloc_app.palette import USUAL, Cameras
+from gazeloc_app.panels.legend import legend_html
 from gazeloc_app.panels.strokes import Strokes
 from gazeloc_app.state import AppState, Layer, LayerSettings
 
@@ -50,6 +51,7 @@ class LayerPanel:
         """`facts(state)` are sentences about what is drawn with less than there is."""
         self._facts, self._dispatch = facts, dispatch
         self._strokes = Strokes()
+        self._legend = gui.add_html("")
         self._boxes = {}
         for layer in layers:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=_hint(layer, USUAL))
@@ -77,6 +79,7 @@ class LayerPanel:
 
     def render(self, state: AppState) -> None:
         """Show the state's layers."""
+        widgets.set_content(self._legend, legend_html(state, tuple(self._boxes)))
         for layer, box in self._boxes.items():
             widgets.set_value(box, state.layers.is_visible(layer))
             widgets.set_property(box, "hint", _hint(layer, state.cameras))
