@@ -55,8 +55,8 @@ class GazeRay:
 
 def gaze_in_scan(data: ProjectData, recording: str, frame: int, trajectory: Trajectory | None) -> GazeRay | None:
     """Where the gaze at a frame meets the scan; None without pose or gaze."""
-    ray = gaze_ray_in_camera(data, recording, frame)
     pose = None if trajectory is None or frame >= len(trajectory) else trajectory.pose(frame)
+    ray = None if pose is None else gaze_ray_in_camera(data, recording, frame)
     if ray is None or pose is None:
         return None
     origin, direction = np.array(pose.translation), pose.rotation.as_matrix() @ ray

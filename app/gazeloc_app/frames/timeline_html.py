@@ -48,7 +48,7 @@ def timeline_html(trajectory: Trajectory | None, score: Floats, error_m: Floats 
     if error_m is not None and np.isfinite(error_m).any():
         top = max(float(np.nanpercentile(error_m, 98)), 1e-6)
         rows.append(_curve(-error_m, 0.0, hexadecimal(ERROR), low=-top))
-        legend.append(f'<i style="background:{hexadecimal(ERROR)}"></i>error, down to {100 * top:.1f} cm')
+        legend.append(f'<i style="background:{hexadecimal(ERROR)}"></i>error 0–{100 * top:.1f} cm ↓')
     return (
         f'<div class="gazeloc-timeline" data-last="{count - 1}"'
         ' onpointerdown="gazelocTimeline.go(event)" onpointermove="gazelocTimeline.drag(event)"'

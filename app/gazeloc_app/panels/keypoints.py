@@ -43,9 +43,13 @@ class KeypointPanel:
         gui.add_html(widgets.box(RULES))
         self._table = gui.add_html("")
         self._selected = gui.add_dropdown("Selected", (NEW,), hint="The next click completes this pair.")
-        self._name = gui.add_text("Name", "", hint="What it is, e.g. “corner of the desk”.")
-        self._enabled = gui.add_checkbox("Counts", True, hint="Whether the pair takes part in the alignment.")
-        self._delete = gui.add_button("Delete the pair", color="red", hint="Both its sides; Undo brings it back.")
+        self._name = gui.add_text("Name", "", visible=False, hint="What it is, e.g. “corner of the desk”.")
+        self._enabled = gui.add_checkbox(
+            "Counts", True, visible=False, hint="Whether the pair takes part in the alignment."
+        )
+        self._delete = gui.add_button(
+            "Delete the pair", color="red", visible=False, hint="Both its sides; Undo brings it back."
+        )
         self._steps = gui.add_button_group("", ("Undo", "Redo"), hint="Ctrl Z and Ctrl Y do the same.")
         widgets.on_user(self._selected, lambda event: dispatch(SelectPair(self._key_of(str(event.target.value)))))
         widgets.on_user(
@@ -80,7 +84,7 @@ class KeypointPanel:
             self._selected.options = options
         widgets.set_value(self._selected, _label(selected) if selected else NEW)
         for handle in (self._name, self._enabled, self._delete):
-            widgets.set_property(handle, "disabled", selected is None)
+            widgets.set_property(handle, "visible", selected is not None)
         widgets.set_value(self._name, selected.name if selected else "")
         widgets.set_value(self._enabled, selected.enabled if selected else True)
 

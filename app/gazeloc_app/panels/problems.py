@@ -124,13 +124,14 @@ def _summary_html(table: FrameTable, marks: FrameMarks, errors: FrameErrors | No
     scored = widgets.card("Nothing is scored yet.", how)
     if len(known):
         scored = f"{len(known)} frames are scored, the median agreement is {np.median(known):.2f} of 1."
-    counts = [f"{int((table.problem == kind.value).sum())} {_COUNTED[kind]}" for kind in Problem if kind.value]
+    counts = [(int((table.problem == kind.value).sum()), words) for kind, words in _COUNTED.items()]
+    problems = ", ".join(f"{count} {words}" for count, words in counts if count) or "none found"
     found = {} if errors is None else errors_by_mark(marks, errors.rotation_deg, errors.position_m)
     marked = [
         f"{count} {mark.value}" + (f" (mean error {100 * found[mark].position_m.mean:.1f} cm)" if mark in found else "")
         for mark, count in marks.counts().items()
     ]
-    return f"{scored}<div>Problems: {', '.join(counts)}.</div><div>Marks: {', '.join(marked)}.</div>"
+    return f"{scored}<div>Problems: {problems}.</div><div>Marks: {', '.join(marked)}.</div>"
 
 
 def _row(state: AppState, table: FrameTable, scores: FrameScores | None, errors: FrameErrors | None, frame: int) -> str:
