@@ -7,15 +7,18 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass
 
 from gazeloc_core.errors import Cancelled, GazelocError, InputError
+from gazeloc_core.gaze import GazeInScan
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stage_list import SCORES, STAGES, Stage, stage_named
 from gazeloc_core.stages.evaluation import evaluate_project, evaluate_recording, verdicts
 from gazeloc_core.stages.exports import FORMATS, export
-from gazeloc_core.stages.poses import methods_with_poses
+from gazeloc_core.stages.gaze import fresh_gaze
+from gazeloc_core.stages.poses import fresh_trajectory, methods_with_poses
 from gazeloc_core.stages.scores import FrameScores, load_scores
 from gazeloc_core.storage.artifacts import State
+from gazeloc_core.trajectory import Trajectory
 
 __all__ = [
     "FORMATS",
@@ -24,6 +27,7 @@ __all__ = [
     "evaluate_project",
     "evaluate_recording",
     "export",
+    "gaze",
     "run",
     "run_after_choice",
     "run_stage",
@@ -31,6 +35,7 @@ __all__ = [
     "stage_named",
     "stamps",
     "statuses",
+    "trajectory",
     "verdicts",
 ]
 
@@ -132,6 +137,28 @@ def run_after_choice(project: Project, recording: str, method: Method, report: R
     for stage in stages:
         run_stage(project, stage, recording, part(report, done / total, (done + stage.weight) / total))
         done += stage.weight
+
+
+def trajectory(project: Project, recording: str, method: Method | None = None) -> Trajectory:
+    """The poses of all frames of a recording in the scan; by the method that it is shown with unless one is named.
+
+    Raises:
+        InputError: if there is no recording of this name.
+        ProjectError: if the method has not run yet, or on what was there before.
+    """
+    project.recording(recording)
+    return fresh_trajectory(project, recording, method or project.method(recording))
+
+
+def gaze(project: Project, recording: str, method: Method | None = None) -> GazeInScan | None:
+    """Every gaze sample of a recording as a ray in the scan and its hit; None for a recording without gaze.
+
+    Raises:
+        InputError: if there is no recording of this name.
+        ProjectError: if the method has not run yet, or on what was there before.
+    """
+    project.recording(recording)
+    return fresh_gaze(project, recording, method or project.method(recording))
 
 
 def score(project: Project, recording: str, method: Method = Method.SFM, report: Report = silent) -> FrameScores:

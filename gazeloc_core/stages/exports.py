@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gazeloc_core.arrays import Bytes
-from gazeloc_core.errors import InputError, ProjectError
+from gazeloc_core.errors import InputError
 from gazeloc_core.export.colmap import write_colmap
 from gazeloc_core.export.frame_notes import FrameNotes
 from gazeloc_core.export.gaze3d_csv import write_gaze3d_csv
@@ -21,10 +21,9 @@ from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
-from gazeloc_core.stages.gaze import gaze_inputs
+from gazeloc_core.stages.gaze import fresh_gaze
 from gazeloc_core.stages.poses import fresh_trajectory, placed_models
 from gazeloc_core.stages.scores import fresh_scores
-from gazeloc_core.storage.artifacts import State
 
 
 def export(
@@ -62,14 +61,11 @@ def export(
 def _csv(project: Project, recording: str, method: Method, folder: Path, report: Report) -> list[Path]:
     report(0.1, "writing poses.csv")
     trajectory = fresh_trajectory(project, recording, method)
-    gaze = project.result(recording, method, "gaze")
-    state, reason = gaze.state(gaze_inputs(project, recording, method))
-    if state is not State.FRESH:
-        raise ProjectError(f"{recording}: the gaze is {state.value} ({reason}); run `gazeloc run` first.")
+    gaze = fresh_gaze(project, recording, method)
     files = write_poses_csv(trajectory, folder / "poses.csv", notes=_notes(project, recording, method))
-    if gaze.header().stats["samples"]:
+    if gaze is not None:
         report(0.5, "writing gaze3d.csv")
-        files += write_gaze3d_csv(inputs.load_gaze(gaze.read_arrays()), folder / "gaze3d.csv")
+        files += write_gaze3d_csv(gaze, folder / "gaze3d.csv")
     return files
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from gazeloc_core.errors import ProjectError
 from gazeloc_core.gaze import GazeInScan, GazeOptions, cast_gaze
 from gazeloc_core.methods import Method
 from gazeloc_core.progress import Report, silent
 from gazeloc_core.project import Project
 from gazeloc_core.stages import inputs
+from gazeloc_core.storage.artifacts import State
 
 
 def cast_gaze_rays(
@@ -40,6 +42,19 @@ def cast_gaze_rays(
         stats={"samples": len(gaze), **gaze.counts()},
     )
     return gaze
+
+
+def fresh_gaze(project: Project, recording: str, method: Method = Method.SFM) -> GazeInScan | None:
+    """The gaze on the scan with a method's poses; None for a recording without gaze.
+
+    Raises:
+        ProjectError: if it was not cast yet, or with earlier poses.
+    """
+    artifact = project.result(recording, method, "gaze")
+    state, reason = artifact.state(gaze_inputs(project, recording, method))
+    if state is not State.FRESH:
+        raise ProjectError(f"{recording}: the gaze is {state.value} ({reason}); run `gazeloc run` first.")
+    return inputs.load_gaze(artifact.read_arrays()) if artifact.header().stats["samples"] else None
 
 
 def gaze_inputs(project: Project, recording: str, method: Method = Method.SFM) -> dict[str, str]:
