@@ -20,11 +20,11 @@ from gazeloc_core.tags.pose import apriltag_poses
 from gazeloc_core.tags.square import UNIT_SQUARE
 from gazeloc_core.transforms import rigid, rotation_from_matrix
 
-OUTLINE = (120, 255, 120)
-FIRST_CORNER = (255, 120, 255)
-CUBE = (255, 214, 90)
-AXES = ((255, 80, 80), (90, 235, 90), (90, 160, 255))
-"""Colours of x, y and z."""
+OUTLINE = (255, 255, 255)
+FIRST_CORNER = (255, 40, 210)
+CUBE = (255, 200, 25)
+AXES = ((225, 55, 45), (70, 250, 145), (90, 105, 255))
+"""Colours of x, y and z; told apart by colour-blind eyes too, and from the others (tests/app/test_palette.py)."""
 
 _RIM = (10, 10, 10)
 _SHIFT = 6  # OpenCV draws on 1/64 of a pixel

@@ -16,6 +16,7 @@ from gazeloc_core.charts.values import Chart, Series
 from gazeloc_core.frames.marks import Mark
 from gazeloc_core.methods import Method
 from gazeloc_core.resources import static_files
+from gazeloc_core.tags import drawing
 from gazeloc_core.trajectory import PoseStatus
 
 # Machado, Oliveira and Fernandes 2009, severity 1: what eyes without one kind of cone see of linear sRGB.
@@ -168,6 +169,15 @@ def test_letters_are_legible_on_pictures_buttons_and_the_banner():
 def test_the_gaze_is_told_from_keypoints_in_a_frame_by_its_colour_and_being_a_ring(eyes):
     for color in (palette.SCAN_SIDE, palette.SFM_SIDE, palette.SELECTED):
         assert apart(palette.GAZE, color, EYES[eyes]) >= FROM_THE_GROUND - 1
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_what_is_drawn_of_a_tag_is_told_apart_and_shows_on_its_dark_rim(eyes):
+    colors = (drawing.OUTLINE, drawing.CUBE, drawing.FIRST_CORNER, *drawing.AXES)
+    for a, b in itertools.combinations(colors, 2):
+        is_dot_and_line = {a, b} == {drawing.FIRST_CORNER, drawing.AXES[2]}
+        assert is_dot_and_line or apart(a, b, EYES[eyes]) >= APART, (a, b)
+    assert min(contrast(color, drawing._RIM) for color in colors) >= 3
 
 
 @pytest.mark.parametrize("eyes", EYES)

@@ -36,12 +36,12 @@ def test_the_first_corner_has_no_half_pixel(at: tuple[float, float]) -> None:
     corners = np.array([at, (140, 61), (141, 20), (81, 20)], dtype=float)
     blank = np.zeros((120, 200, 3), np.uint8)
     drawn = draw_tags(blank, [DrawnTag(0, corners)], PINHOLE, None, DrawingOptions(label=False, width_px=3)).astype(int)
-    red_and_blue = np.minimum(drawn[..., 0], drawn[..., 2]) - 120  # the outline has 120 of each
-    weight = np.clip(red_and_blue, 0, None)
+    magenta = np.minimum(drawn[..., 0], drawn[..., 2]) - drawn[..., 1]  # the white outline has none
+    weight = np.clip(magenta, 0, None)
     y, x = np.mgrid[:120, :200] + 0.5
     middle = np.array([(x * weight).sum(), (y * weight).sum()]) / weight.sum()
     np.testing.assert_allclose(middle, at, atol=0.15)
-    assert weight.max() >= FIRST_CORNER[0] - 125
+    assert weight.max() >= FIRST_CORNER[2] - FIRST_CORNER[1] - 5
 
 
 def test_outline_and_cube_are_where_the_camera_sees_them() -> None:
