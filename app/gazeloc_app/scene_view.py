@@ -32,6 +32,7 @@ from gazeloc_app.scene.grid import GridLayer
 from gazeloc_app.scene.kept import Kept
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
+from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.state import AppState, Layer
@@ -128,7 +129,9 @@ class SceneView:
                 self._render.reopen()
             self._mesh = mesh
             set_start(self._server, mesh, self._data.scan().up_axis)
-            self._grid.show(*room_corners(mesh), self._data.scan().up_axis)
+            corners = room_corners(mesh)
+            self._grid.show(*corners, self._data.scan().up_axis)
+            self._keypoints.size = self._gaze.size = size_factor(*corners)
         display = self._screen.display()
         if display is not None:
             self.front = display.front

@@ -11,6 +11,7 @@ from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.grid import GridLayer, grid_lines
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
+from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import FOV_RAD, overview, set_start, up_vector
 from gazeloc_app.server import make_server
@@ -231,6 +232,27 @@ def test_the_grid_lies_on_the_floor_in_whole_metres(server, sent, up_axis, floor
     assert {"/grid", "/grid-x", "/grid-y", "/grid-z"} <= names(server)
     assert not server.scene._handle_from_node_name["/grid"].visible
     assert "".join(node.text for node in layer._nodes[1:] if len(node.text) > 1) in (f"{up_axis} ↑", f"{up_axis[1:]} ↓")
+
+
+def test_the_grid_of_a_very_large_scan_has_squares_of_ten_metres(server):
+    lines, _ = grid_lines(np.array([-3.0, 0.0, 2.0]), np.array([480.0, 9.0, 130.0]), "y")
+    assert len(lines) < 100
+    np.testing.assert_array_equal(np.unique(lines[:-3, 0, 2]), np.arange(0, 131, 10))
+    np.testing.assert_allclose(lines[-3:, 1] - lines[-3:, 0], 10 * np.eye(3))
+
+
+@pytest.mark.parametrize(("size_m", "factor"), [((0.6, 0.9, 0.5), 0.3), ((4, 2.6, 3), 1.0), ((12, 4, 9), 1.3)])
+def test_markers_are_as_large_as_the_room_asks_for(server, size_m, factor):
+    found = size_factor(np.zeros(3), np.array(size_m))
+    assert found == pytest.approx(factor, rel=0.05)
+    keypoints, gaze = KeypointsLayer(server.scene, radius_m=0.025), GazeLayer(server.scene)
+    keypoints.size = gaze.size = found
+    keypoints.show(KeypointSet((KeypointPair("k1", "desk", (1, 1, 1)),)), None)
+    gaze.show(np.zeros(3), hit=np.array([0, 0, 1.5]))
+    assert server.scene._handle_from_node_name["/keypoints/k1/scan"].radius == pytest.approx(0.025 * found)
+    assert server.scene._handle_from_node_name["/gaze/hit"].radius == pytest.approx(0.035 * found)
+    keypoints.show(KeypointSet(()), None)
+    gaze.show(None)
 
 
 def test_gaze_shows_a_hit_only_where_there_is_one(server, sent):

@@ -32,6 +32,7 @@ from gazeloc_app.panels.problems import ProblemPanel
 from gazeloc_app.panels.project import ProjectPanel
 from gazeloc_app.panels.suggestion import SuggestionPanel
 from gazeloc_app.panels.views import ViewList
+from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.state import AppState
@@ -39,7 +40,7 @@ from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
 from gazeloc_core.surfaces.saved_views import SavedView, usual_views
-from gazeloc_core.surfaces.viewpoint import up_vector
+from gazeloc_core.surfaces.viewpoint import room_corners, up_vector
 
 MAIN_WIDTH_PX, SIDE_WIDTH_PX = 400, 430
 
@@ -114,7 +115,11 @@ MAIN_TABS = (
         (
             lambda desk: KeypointPanel(desk.gui, desk.state, desk.data, desk.dispatch),
             lambda desk: SuggestionPanel(
-                desk.gui, Proposals(desk.data), desk.dispatch, desk.go_to, SuggestionLayer(desk.server.scene).show
+                desk.gui,
+                Proposals(desk.data),
+                desk.dispatch,
+                desk.go_to,
+                SuggestionLayer(desk.server.scene, lambda: size_factor(*room_corners(desk.data.mesh()))).show,
             ),
             lambda desk: KeypointFiles(desk.gui, desk.state, desk.data.scan, desk.dispatch),
         ),

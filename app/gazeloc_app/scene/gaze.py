@@ -21,6 +21,8 @@ class GazeLayer:
         self._scene = scene
         self._rays: NodeGroup[tuple[Point, Point]] = NodeGroup(self._make_ray)
         self._hits: NodeGroup[Point] = NodeGroup(self._make_hit)
+        self.size = 1.0
+        """By what the point's size is multiplied from now on (`sizes.size_factor`)."""
 
     def show(self, origin: Floats | None, direction: Floats | None = None, hit: Floats | None = None) -> None:
         """Draw the ray from `origin` (3,) to its `hit` (3,), or where it has none 5 m along `direction`; None: none."""
@@ -48,7 +50,7 @@ class GazeLayer:
     def _make_hit(self, name: str, point: Point) -> viser.IcosphereHandle:
         return self._scene.add_icosphere(
             name,
-            radius=_HIT_RADIUS_M,
+            radius=self.size * _HIT_RADIUS_M,
             color=GAZE,
             opacity=0.8,
             position=np.array(point),

@@ -12,10 +12,13 @@ from gazeloc_core.surfaces.viewpoint import up_vector
 
 _ABOVE_FLOOR_M = 0.005
 """So that the lines are not half in the floor."""
+_MOST_SQUARES = 100
 
 
 class GridLayer:
     """Squares of one metre at the floor's height, and the scan's axes, 1 m each, where its origin meets the ground.
+
+    In what is larger than a hall both are of 10 m, or of 100 m, so that there are never more than 100 squares in a row.
 
     The lines are at `/grid`, the axes' names at `/grid-x` to `/grid-z`, the one that is up with an arrow.
     """
@@ -46,20 +49,21 @@ class GridLayer:
 
 
 def grid_lines(low: Floats, high: Floats, up_axis: str) -> tuple[Floats, Bytes]:
-    """Lines (N, 2, 3) at whole metres of the scan's axes, the last three its axes x, y, z; and colours (N, 3)."""
+    """Lines (N, 2, 3) at whole metres (or tens) of the scan's axes, the last three its axes; and colours (N, 3)."""
     up = up_vector(up_axis)
     height = int(np.flatnonzero(up)[0])
     first, second = (axis for axis in range(3) if axis != height)
     floor = (low if up[height] > 0 else high)[height] + _ABOVE_FLOOR_M * up[height]
-    start, end = np.floor(low), np.ceil(high)
+    step = 10.0 ** max(0, np.ceil(np.log10(max(float((high - low).max()), 1.0) / _MOST_SQUARES)))
+    start, end = step * np.floor(low / step), step * np.ceil(high / step)
     lines = []
     for along, across in ((first, second), (second, first)):
-        for place in np.arange(start[across], end[across] + 0.5):
+        for place in np.arange(start[across], end[across] + 0.5 * step, step):
             ends = np.full((2, 3), floor)
             ends[:, across], ends[:, along] = place, (start[along], end[along])
             lines.append(ends)
     origin = np.clip(np.zeros(3), start, end)  # a scan's origin may lie outside of the room
     origin[height] = floor
-    axes = np.stack([np.tile(origin, (3, 1)), origin + np.eye(3)], axis=1)
+    axes = np.stack([np.tile(origin, (3, 1)), origin + step * np.eye(3)], axis=1)
     colors = np.concatenate([np.tile(np.array(GROUND), (len(lines), 1)), AXES]).astype(np.uint8)
     return np.concatenate([lines, axes]), colors

@@ -48,6 +48,8 @@ class KeypointsLayer:
         self._scene = scene
         self._on_drag = on_drag
         self._radius_m = radius_m
+        self.size = 1.0
+        """By what the markers' size is multiplied from now on (`sizes.size_factor`)."""
         self._markers: NodeGroup[_Marker] = NodeGroup(self._make_marker)
         self._labels: NodeGroup[_Label] = NodeGroup(self._make_label)
         self._residuals: NodeGroup[_Residual] = NodeGroup(self._make_residual)
@@ -64,7 +66,7 @@ class KeypointsLayer:
             for side, point in drawn.items():
                 is_selected = pair.key == selected
                 markers[f"{base}/{side}"] = _Marker(
-                    point, _color(pair, side, is_selected), self._radius_m * (1.4 if is_selected else 1.0)
+                    point, _color(pair, side, is_selected), self.size * self._radius_m * (1.4 if is_selected else 1.0)
                 )
             if drawn:
                 labels[f"{base}/label"] = _Label(next(iter(drawn.values())), pair.name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import viser
 
@@ -14,8 +16,9 @@ RADIUS_M = 0.05
 class SuggestionLayer:
     """A see-through ball at `/suggestion`, larger than a keypoint's, with a word beside it."""
 
-    def __init__(self, scene: viser.SceneApi):
-        self._scene = scene
+    def __init__(self, scene: viser.SceneApi, size: Callable[[], float] = lambda: 1.0):
+        """`size()` multiplies the ball's size (`sizes.size_factor`)."""
+        self._scene, self._size = scene, size
         self._handles: tuple[viser.IcosphereHandle, viser.LabelHandle] | None = None
         self._shown: Point | None = None
 
@@ -32,7 +35,7 @@ class SuggestionLayer:
             at = np.array(in_scan)
             ball = self._scene.add_icosphere(
                 "/suggestion/ball",
-                radius=RADIUS_M,
+                radius=self._size() * RADIUS_M,
                 color=SELECTED,
                 opacity=0.4,
                 subdivisions=3,

@@ -16,8 +16,9 @@ _END_RADIUS_M = 0.015
 class TapeLayer:
     """The ends at `/tape/0` and `/tape/1`, the line between them at `/tape/line`, the length at `/tape/length`."""
 
-    def __init__(self, scene: viser.SceneApi):
-        self._scene = scene
+    def __init__(self, scene: viser.SceneApi, size: float = 1.0):
+        """`size` multiplies the ends' size (`sizes.size_factor`)."""
+        self._scene, self._size = scene, size
         self._ends: NodeGroup[Point] = NodeGroup(self._make_end)
         self._lines: NodeGroup[tuple[Point, Point]] = NodeGroup(self._make_line)
         self._lengths: NodeGroup[tuple[Point, str]] = NodeGroup(self._make_length)
@@ -37,7 +38,7 @@ class TapeLayer:
     def _make_end(self, name: str, point: Point) -> viser.IcosphereHandle:
         return self._scene.add_icosphere(
             name,
-            radius=_END_RADIUS_M,
+            radius=self._size * _END_RADIUS_M,
             color=TAPE,
             position=np.array(point),
             cast_shadow=False,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from gazeloc_app.actions.action import Action, Notify
+from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.tape import TapeLayer, length_text
 from gazeloc_app.state import Level
 from gazeloc_app.tools.tool import Bench, Click, Tool
 from gazeloc_core.keypoints import Point
-from gazeloc_core.surfaces.viewpoint import up_vector
+from gazeloc_core.surfaces.viewpoint import room_corners, up_vector
 
 
 class TapeTool(Tool):
@@ -18,7 +19,7 @@ class TapeTool(Tool):
 
     def __init__(self, bench: Bench):
         super().__init__(bench)
-        self._layer = TapeLayer(bench.client.scene)
+        self._layer = TapeLayer(bench.client.scene, size_factor(*room_corners(bench.data.scan().mesh)))
         self._ends: tuple[Point, ...] = ()
 
     def click(self, click: Click) -> Action | None:
