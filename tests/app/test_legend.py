@@ -1,10 +1,7 @@
 """The legend names what shows, in the colours that are drawn."""
 
-from dataclasses import replace
-
 from gazeloc_app.actions.views import ColorCameras, ShowLayer, TintLayer, UseSafeColors
 from gazeloc_app.palette import SAFE, UNDER, USUAL, hexadecimal
-from gazeloc_app.panels.layers import OF_THE_ROOM
 from gazeloc_app.panels.legend import legend_html
 from gazeloc_app.state import AppState, Coloring, Layer
 
@@ -35,8 +32,8 @@ def test_what_is_hidden_or_has_a_scale_of_its_own_is_left_out():
     assert entry(Layer.TRUTH, UNDER) in by_error
 
 
-def test_without_a_recording_it_is_about_the_room():
-    html = legend_html(replace(STATE, recordings=(), recording=""), OF_THE_ROOM)
-    assert html.count("<i ") == 2
+def test_it_is_about_the_layers_that_have_something_to_show():
+    html = legend_html(STATE, (Layer.SCAN, Layer.PHONE, Layer.GRID))
+    assert html.count("<i ") == 1
     assert entry(Layer.PHONE, USUAL.phone) in html
     assert legend_html(STATE, ()) == ""

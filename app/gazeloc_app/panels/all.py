@@ -15,6 +15,7 @@ from gazeloc_app.data import ProjectData
 from gazeloc_app.keypoints.suggestions import Proposals
 from gazeloc_app.panels.alignment import AlignmentPanel
 from gazeloc_app.panels.camera_colors import CameraColors
+from gazeloc_app.panels.contents import layers_with_contents
 from gazeloc_app.panels.export import ExportPanel
 from gazeloc_app.panels.figures import FigurePanel
 from gazeloc_app.panels.first_steps import FirstSteps
@@ -24,7 +25,7 @@ from gazeloc_app.panels.history import HistoryPanel
 from gazeloc_app.panels.jobs import JobBar, JobLogs
 from gazeloc_app.panels.keypoint_files import KeypointFiles
 from gazeloc_app.panels.keypoints import KeypointPanel
-from gazeloc_app.panels.layers import OF_THE_ROOM, LayerPanel
+from gazeloc_app.panels.layers import LayerPanel
 from gazeloc_app.panels.loupe import LoupePanel
 from gazeloc_app.panels.methods import MethodPanel
 from gazeloc_app.panels.no_recording import NoRecording
@@ -35,7 +36,7 @@ from gazeloc_app.panels.views import ViewList
 from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.suggestion import SuggestionLayer
 from gazeloc_app.scene_view import SceneView
-from gazeloc_app.state import AppState
+from gazeloc_app.state import AppState, Layer
 from gazeloc_core.keypoints import Point
 from gazeloc_core.project import Project
 from gazeloc_core.resources import static_file
@@ -89,6 +90,10 @@ class Desk:
         if browser is not None:
             browser.go_to(in_scan)
 
+    def contents(self, state: AppState) -> tuple[Layer, ...]:
+        """The layers that have something to show."""
+        return layers_with_contents(self.data, state)
+
     def usual_views(self) -> dict[str, SavedView]:
         """The views that every scan has."""
         return usual_views(self.data.scan().mesh, self.data.scan().up_axis)
@@ -132,7 +137,7 @@ MAIN_TABS = (
         "Layers",
         (
             lambda desk: ViewList(desk.server, desk.usual_views, up_vector(desk.data.scan().up_axis), desk.dispatch),
-            lambda desk: LayerPanel(desk.gui, desk.dispatch, desk.scene.facts),
+            lambda desk: LayerPanel(desk.gui, desk.dispatch, desk.scene.facts, desk.contents),
             lambda desk: CameraColors(desk.gui, desk.scene.cameras, desk.dispatch),
         ),
     ),
@@ -150,7 +155,7 @@ MAIN_TABS_WITHOUT_RECORDING = (
         "Layers",
         (
             lambda desk: ViewList(desk.server, desk.usual_views, up_vector(desk.data.scan().up_axis), desk.dispatch),
-            lambda desk: LayerPanel(desk.gui, desk.dispatch, desk.scene.facts, OF_THE_ROOM),
+            lambda desk: LayerPanel(desk.gui, desk.dispatch, desk.scene.facts, desk.contents),
         ),
     ),
     Tab("History", (lambda desk: HistoryPanel(desk.gui, desk.dispatch),)),

@@ -33,27 +33,27 @@ HINTS = {
 }
 _NAMED = (Layer.TRUTH, Layer.ESTIMATE, Layer.PHONE)
 """Whose colours have words in `palette.Cameras.words`."""
-OF_THE_ROOM = (Layer.SCAN, Layer.SCAN_TAGS, Layer.PHONE, Layer.GRID, Layer.PEOPLE)
-"""Those that show something in a project without a recording."""
 TINTABLE = (Layer.SCAN, Layer.POINTS, Layer.PHONE, Layer.TRUTH, Layer.ESTIMATE)
 
 
 class LayerPanel:
-    """A checkbox per layer; one colour field for the layer that is to be tinted."""
+    """A checkbox per layer that has something to show; one colour field for the layer that is to be tinted."""
 
     def __init__(
         self,
         gui: GuiApi,
         dispatch: Callable[[Action], None],
         facts: Callable[[AppState], tuple[str, ...]],
-        layers: Sequence[Layer] = tuple(Layer),
+        contents: Callable[[AppState], Sequence[Layer]],
     ):
-        """`facts(state)` are sentences about what is drawn with less than there is."""
-        self._facts, self._dispatch = facts, dispatch
+        """`facts(state)` are sentences about what is drawn with less than there is; `contents(state)` the layers that
+        have something to show.
+        """
+        self._facts, self._contents, self._dispatch = facts, contents, dispatch
         self._strokes = Strokes()
         self._legend = gui.add_html("")
         self._boxes = {}
-        for layer in layers:
+        for layer in Layer:
             box = gui.add_checkbox(layer.value, LayerSettings().is_visible(layer), hint=_hint(layer, USUAL))
             widgets.on_user(box, partial(_show, dispatch, layer))
             self._boxes[layer] = box
@@ -66,7 +66,7 @@ class LayerPanel:
         self._note = gui.add_html("")
         with gui.add_folder("Tint", expand_by_default=False):
             self._which = gui.add_dropdown(
-                "Layer", tuple(layer.value for layer in TINTABLE if layer in layers), hint="What the colour is for."
+                "Layer", tuple(layer.value for layer in TINTABLE), hint="What the colour is for."
             )
             self._color = gui.add_rgb("Colour", (255, 160, 60), hint="Instead of the layer's own colours.")
             self._own = gui.add_button("Own colours", hint="Take the tint away.")
@@ -79,8 +79,13 @@ class LayerPanel:
 
     def render(self, state: AppState) -> None:
         """Show the state's layers."""
-        widgets.set_content(self._legend, legend_html(state, tuple(self._boxes)))
+        layers = self._contents(state)
+        widgets.set_content(self._legend, legend_html(state, layers))
+        tintable = tuple(layer.value for layer in TINTABLE if layer in layers)
+        if tuple(self._which.options) != tintable:
+            self._which.options = tintable
         for layer, box in self._boxes.items():
+            widgets.set_property(box, "visible", layer in layers)
             widgets.set_value(box, state.layers.is_visible(layer))
             widgets.set_property(box, "hint", _hint(layer, state.cameras))
         widgets.set_value(self._safe, state.are_colors_safe)
