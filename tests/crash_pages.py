@@ -40,6 +40,7 @@ from gazeloc_core.project import Project
 SIZE = {"width": 1260, "height": 640}
 BACK_S = 60.0
 """So long a page may take to come back by itself on a busy machine."""
+START_S = 300.0
 _RECORD = """
 (() => {
   let last = '', told = '';
@@ -231,7 +232,7 @@ def _begin(folder: Path, port: int, life: int) -> tuple[BaseProcess, Path]:
     log.unlink(missing_ok=True)
     process = context.Process(target=_live, args=(folder, port, log))
     process.start()
-    end = time.monotonic() + BACK_S
+    end = time.monotonic() + START_S
     while not (log.exists() and _entries(log)):
         assert process.is_alive(), "the app did not start"
         assert time.monotonic() < end, "the app does not start"

@@ -3,7 +3,7 @@
 | file | holds | source |
 |---|---|---|
 | JSON of ours | whole pairs, with the clicks in frames | `KeypointSet.to_json`, as in the project folder |
-| CSV | whole pairs without clicks: name, enabled, scan_x_m .. scan_z_m, sfm_x .. sfm_z; cells may be empty | ours |
+| CSV | pairs without clicks: name, enabled, scan_x_m .. scan_z_m, sfm_x .. sfm_z, in any order; one side will do | ours |
 | CloudCompare's picked points | one side: `x,y,z`, `index,x,y,z`, `label,x,y,z` or both | cloudcompare_points.py |
 | tables of pairs | the reference's side, or both: CloudCompare's console, LiDAR360 | cloudcompare_points.py |
 | Stray's `keypoints.json` | one side: {"keypoints": [{"position": [x, y, z]}, ...]} | Stray's scene format |
@@ -32,7 +32,12 @@ from gazeloc_core.clicks.keypoint_cells import REMEDY, SideName, name_of, one_si
 from gazeloc_core.errors import InputError
 from gazeloc_core.keypoints import KeypointPair, KeypointSet, Point
 
-COLUMNS = ("name", "enabled", "scan_x_m", "scan_y_m", "scan_z_m", "sfm_x", "sfm_y", "sfm_z")
+SIDE_COLUMNS: dict[SideName, tuple[str, ...]] = {
+    "scan": ("scan_x_m", "scan_y_m", "scan_z_m"),
+    "sfm": ("sfm_x", "sfm_y", "sfm_z"),
+}
+COLUMNS = ("name", "enabled", *SIDE_COLUMNS["scan"], *SIDE_COLUMNS["sfm"])
+_OUR_HEADER = re.compile(rf"\s*[^\n]*\b({'|'.join(COLUMNS[2:])})\b|\s*name\s*,\s*enabled\s*,", re.IGNORECASE)
 MOST_PAIRS = 5000
 MOST_BYTES = 4_000_000
 
@@ -57,7 +62,7 @@ def read_keypoints(name: str, content: bytes, side: SideName, metres_per_unit: f
         pairs = cloudcompare_points.from_table_of_pairs(name, text, side)
     elif text.lstrip()[:1] in ("{", "["):
         pairs, is_ours = _from_json(name, text, side), text.lstrip()[0] == "["
-    elif re.match(r"\s*name\s*,\s*enabled\s*,", text):
+    elif _OUR_HEADER.match(text):
         pairs, is_ours = _from_csv(name, text), True
     else:
         pairs = cloudcompare_points.from_list(name, text, side)
@@ -182,16 +187,38 @@ def _from_csv(name: str, text: str) -> list[KeypointPair]:
         rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text, newline="")) if row]
     except csv.Error as error:
         raise InputError.of(name, f"the file is not CSV ({error})", REMEDY) from error
-    if tuple(rows[0]) != COLUMNS:
-        raise InputError.of(name, f"the header is {','.join(rows[0])[:80]}, not {','.join(COLUMNS)}", REMEDY)
+    header = _checked_header(name, [cell.lower() for cell in rows[0]])
     pairs = []
     for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(COLUMNS):
-            problem = f"row {number} has {len(row)} values, the header {len(COLUMNS)}"
+        if len(row) != len(header):
+            problem = f"row {number} has {len(row)} values, the header {len(header)}"
             raise InputError.of(name, problem, REMEDY)
-        if row[1] not in ("0", "1"):
-            raise InputError.of(name, f"row {number}: enabled is {row[1][:20]!r}, not 0 or 1", REMEDY)
-        scan, sfm = (point_of(name, f"row {number}", cells) if any(cells) else None for cells in (row[2:5], row[5:8]))
-        label = name_of(row[0], f"Point {number - 1}")
-        pairs.append(KeypointPair("", label, scan=scan, sfm=sfm, enabled=row[1] == "1"))
+        pairs.append(_pair_of(name, number, dict(zip(header, row, strict=True))))
     return pairs
+
+
+def _checked_header(name: str, header: list[str]) -> list[str]:
+    """The columns, each known and once, and of each side that has one all three."""
+    for column in header:
+        if column not in COLUMNS:
+            known = ", ".join(COLUMNS)
+            raise InputError.of(name, f"the header has the column {column[:20]!r}, which is none of {known}", REMEDY)
+        if header.count(column) > 1:
+            raise InputError.of(name, f"the header has the column {column} twice", REMEDY)
+    for columns in SIDE_COLUMNS.values():
+        missing = set(columns) - set(header)
+        if 0 < len(missing) < len(columns):
+            raise InputError.of(name, f"the header has no column {min(missing)}", REMEDY)
+    return header
+
+
+def _pair_of(name: str, number: int, cells: dict[str, str]) -> KeypointPair:
+    enabled = cells.get("enabled", "1")
+    if enabled not in ("0", "1"):
+        raise InputError.of(name, f"row {number}: enabled is {enabled[:20]!r}, not 0 or 1", REMEDY)
+    places = {}
+    for side, columns in SIDE_COLUMNS.items():
+        values = [cells.get(column, "") for column in columns]
+        places[side] = point_of(name, f"row {number}", values) if any(values) else None
+    label = name_of(cells.get("name", ""), f"Point {number - 1}")
+    return KeypointPair("", label, scan=places["scan"], sfm=places["sfm"], enabled=enabled == "1")

@@ -89,7 +89,7 @@ def test_what_is_saved_in_a_browser_is_read_again(app, panel, label):
     panel.render(app.store.state)
     panel._format.value = label
     sent = []
-    panel._send(SimpleNamespace(send_file_download=lambda name, content: sent.append((name, content))))
+    panel._send(SimpleNamespace(send_file_download=lambda name, content, **how: sent.append((name, content))))
     ((name, content),) = sent
     assert name == f"walk-keypoints{WRITERS[FORMATS[label]][0]}"
     side = "sfm" if FORMATS[label].endswith("sfm") else "scan"

@@ -33,6 +33,13 @@ def test_csv_keeps_names_sides_and_switches_to_the_last_bit():
     ]
 
 
+def test_csv_may_leave_out_columns_and_have_them_in_any_order():
+    text = "SFM_z,sfm_x, sfm_y,name\n3,1,2,socket\n,,,\n"
+    socket, unnamed = read_keypoints("mine.csv", text.encode(), "scan")
+    assert (socket.name, socket.scan, socket.sfm, socket.enabled) == ("socket", None, (1, 2, 3), True)
+    assert (unnamed.name, unnamed.scan, unnamed.sfm) == ("Point 2", None, None)
+
+
 @pytest.mark.parametrize("side", ["scan", "sfm"])
 def test_lists_of_one_side_put_together_are_the_pairs(side):
     read = through(f"cloudcompare-{side}", side=side)
@@ -126,7 +133,10 @@ def test_a_table_of_pairs_that_were_not_moved_gives_both_sides():
         (b"1,2\n", "line 1"),
         (b"1,2,3\na,b,c\n", "line 2"),
         (b"1,2,1e30\n", "no place"),
-        (b"name,enabled,x\n1,1,1\n", "header"),
+        (b"name,enabled,x\n1,1,1\n", "the column 'x', which is none of name, enabled, scan_x_m"),
+        (b"scan_x_m,scan_y_m\n1,1\n", "the header has no column scan_z_m"),
+        (b"scan_x_m,scan_y_m,scan_z_m,sfm_y\n1,1,1,1\n", "the header has no column sfm_x"),
+        (b"name,scan_x_m,scan_y_m,scan_z_m,name\na,1,1,1,b\n", "the column name twice"),
         (",".join(("name", "enabled", "scan_x_m", "scan_y_m", "scan_z_m", "sfm_x", "sfm_y", "sfm_z")).encode(), "no "),
         (b"name,enabled,scan_x_m,scan_y_m,scan_z_m,sfm_x,sfm_y,sfm_z\na,2,1,2,3,1,2,3\n", "row 2"),
         (b"name,enabled,scan_x_m,scan_y_m,scan_z_m,sfm_x,sfm_y,sfm_z\na,1,1,2,,1,2,3\n", "row 2"),

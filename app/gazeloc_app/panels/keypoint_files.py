@@ -69,4 +69,4 @@ class KeypointFiles:
         chosen = FORMATS.get(str(self._format.value), "json")
         text = keypoints_text(chosen, self._state.annotation.keypoints, self._scan().metres_per_unit)
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", self._state.recording)
-        client.send_file_download(f"{stem}-keypoints{WRITERS[chosen][0]}", text.encode())
+        client.send_file_download(f"{stem}-keypoints{WRITERS[chosen][0]}", text.encode(), save_immediately=True)
