@@ -3,7 +3,7 @@
 | file | holds | source |
 |---|---|---|
 | JSON of ours | whole pairs, with the clicks in frames | `KeypointSet.to_json`, as in the project folder |
-| CSV | pairs without clicks: name, enabled, scan_x_m .. scan_z_m, sfm_x .. sfm_z, in any order; one side will do | ours |
+| CSV | pairs without clicks: name, enabled, scan_x_m .. scan_z_m, sfm_x .. sfm_z, any order; one side will do | ours |
 | CloudCompare's picked points | one side: `x,y,z`, `index,x,y,z`, `label,x,y,z` or both | cloudcompare_points.py |
 | tables of pairs | the reference's side, or both: CloudCompare's console, LiDAR360 | cloudcompare_points.py |
 | Stray's `keypoints.json` | one side: {"keypoints": [{"position": [x, y, z]}, ...]} | Stray's scene format |

@@ -60,10 +60,10 @@ def test_lists_of_other_programs_are_in_the_unit_of_the_scan_file(app, panel_in_
     panel_in_mm.render(app.store.state)
     panel_in_mm._format.value = "CloudCompare, on the scan"
     sent = []
-    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content: sent.append(content)))
+    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content, **how: sent.append(content)))
     assert read_keypoints("x", sent[0], "scan").pairs[0].scan == pytest.approx((1000, 2000, 500))
     panel_in_mm._format.value = "CSV"
-    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content: sent.append(content)))
+    panel_in_mm._send(SimpleNamespace(send_file_download=lambda name, content, **how: sent.append(content)))
     assert read_keypoints("x", sent[1], "scan", 0.001).pairs[0].scan == pytest.approx((1, 2, 0.5))
 
 
