@@ -62,6 +62,7 @@ PEOPLE = SERIES
 """By their numbers."""
 CHART_TEXT: Rgb = (123, 135, 148)
 """Legible in light and dark."""
+CHART_GRID = "rgba(136,136,136,0.3)"
 CLEAR = "rgba(0,0,0,0)"
 """No colour, as charts want it."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from gazeloc_app.palette import CHART_TEXT, CLEAR, SERIES, hexadecimal
+from gazeloc_app.palette import CHART_GRID, CHART_TEXT, CLEAR, SERIES, hexadecimal
 from gazeloc_core.charts.values import Chart, Drawing, HeatMap, Series
 
 
@@ -37,6 +37,8 @@ def to_plotly(drawing: Drawing) -> go.Figure:
         plot_bgcolor=CLEAR,
         modebar={"remove": ["zoom", "pan", "select", "lasso", "zoomIn", "zoomOut", "autoScale", "resetScale"]},
     )
+    figure.update_xaxes(gridcolor=CHART_GRID, zerolinecolor=CHART_GRID)
+    figure.update_yaxes(gridcolor=CHART_GRID, zerolinecolor=CHART_GRID)
     if isinstance(drawing, Chart) and drawing.log_y:
         figure.update_yaxes(type="log")
     return figure

@@ -3,6 +3,9 @@
 window.gazelocLoupe = (function loupe() {
   const KEY = "gazeloc-loupe-folded";
   const LEAST = 340;
+  const BESIDE = 8; // between the window and the sides of the 3D view
+  const EDGE = 14; // lens.css: the window's padding on both sides, and the gap between its boxes
+  const GAP = 6;
   let dock;
 
   function build() {
@@ -22,9 +25,18 @@ window.gazelocLoupe = (function loupe() {
     const canvas = window.__viserMutable && window.__viserMutable.canvas;
     if (!canvas || !dock.childElementCount) return;
     const box = canvas.getBoundingClientRect();
-    dock.style.left = `${Math.round(box.left) + 14}px`;
-    dock.style.maxWidth = `${Math.round(box.width) - 28}px`;
+    dock.style.left = `${Math.round(box.left) + BESIDE}px`;
+    dock.style.maxWidth = `${Math.round(box.width) - 2 * BESIDE}px`;
+    showWhole(box.width - 2 * BESIDE - EDGE);
     dock.toggleAttribute("data-narrow", box.width < LEAST); // it would hide what it belongs to
+  }
+
+  // Of the boxes as many as fit whole.
+  function showWhole(width) {
+    const boxes = dock.querySelector(".gazeloc-loupe-boxes");
+    const step = boxes.firstElementChild ? boxes.firstElementChild.offsetWidth + GAP : 0;
+    if (step <= GAP) return; // folded
+    boxes.style.maxWidth = `${Math.max(1, Math.floor((width + GAP) / step)) * step - GAP}px`;
   }
 
   function pin(box) {

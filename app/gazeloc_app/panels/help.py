@@ -27,7 +27,7 @@ WORDS = (
     ("recording", "what the glasses recorded: frames, gaze, times"),
     (
         "reconstruction",
-        "the recording's cameras and points of the room, found from its frames alone; no scale yet",
+        "the recording's cameras and points of the room, found from its frames alone (SfM); no scale yet",
     ),
     ("alignment", "the scale, turn and shift that put the reconstruction onto the scan"),
     ("keypoint", "one spot of the room, clicked on both sides"),

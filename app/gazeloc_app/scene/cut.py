@@ -75,4 +75,4 @@ def _planes(axis: Floats, value: Sequence[float], start: float, size: float) -> 
 
 
 def _labels(up_axis: str) -> list[str]:
-    return ["Height", *(f"Along {axis}" for axis in "xyz" if axis != up_axis[-1])]
+    return ["Height, m", *(f"Along {axis}, m" for axis in "xyz" if axis != up_axis[-1])]
