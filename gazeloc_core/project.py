@@ -163,6 +163,18 @@ class Project:
             for parent in (recording, *(recording / method.value for method in Method)):
                 settle_folders(parent)
 
+    def check_is_there(self) -> None:
+        """Whoever writes on and on asks this before: a folder made anew in its place would hide what is missing.
+
+        Raises:
+            ProjectError: if the folder was renamed, moved or removed since it was opened.
+        """
+        if not (self.folder / "project.json").is_file():
+            raise ProjectError(
+                f"{self.folder}: the project is no longer there (renamed, moved?), so your last changes cannot be "
+                "saved; put it back, they are kept in here until then."
+            )
+
     def add_recording(self, name: str, entry: RecordingEntry) -> None:
         """Add one recording.
 
@@ -231,12 +243,12 @@ class Project:
 
     def keypoints(self, recording: str) -> KeypointSet:
         """The clicked keypoints of a recording, empty where nobody clicked."""
-        path = self._keypoints_path(recording)
+        path = self.keypoints_path(recording)
         return KeypointSet.from_json(read_json(path, "clicked keypoints")) if path.exists() else KeypointSet()
 
     def save_keypoints(self, recording: str, keypoints: KeypointSet) -> None:
         """Write the clicked keypoints of a recording."""
-        write_json_atomically(self._keypoints_path(recording), keypoints.to_json())
+        write_json_atomically(self.keypoints_path(recording), keypoints.to_json())
 
     def history_path(self, recording: str) -> Path:
         """The file of the steps that people took in the app."""
@@ -244,13 +256,13 @@ class Project:
 
     def marks(self, recording: str) -> FrameMarks:
         """What people think of the frames of a recording, empty where nobody marked any."""
-        path = self._marks_path(recording)
+        path = self.marks_path(recording)
         return FrameMarks.from_json(read_json(path, "marks of frames")) if path.exists() else FrameMarks()
 
     def save_marks(self, recording: str, marks: FrameMarks) -> None:
         """Write what people think of the frames of a recording."""
-        if len(marks) or self._marks_path(recording).exists():
-            write_json_atomically(self._marks_path(recording), marks.to_json())
+        if len(marks) or self.marks_path(recording).exists():
+            write_json_atomically(self.marks_path(recording), marks.to_json())
 
     def hash_of_file(self, path: Path) -> str:
         """The content hash of a file or folder outside the project, remembered between runs."""
@@ -264,10 +276,12 @@ class Project:
         _, scan, sfm = self.keypoints(recording).counting()
         return hash_of_value([scan.tolist(), sfm.tolist()])
 
-    def _keypoints_path(self, recording: str) -> Path:
+    def keypoints_path(self, recording: str) -> Path:
+        """The file of clicked keypoints."""
         return self.folder / "annotations" / f"{recording}.json"
 
-    def _marks_path(self, recording: str) -> Path:
+    def marks_path(self, recording: str) -> Path:
+        """The file of what people think of frames."""
         return self.folder / "annotations" / "marks" / f"{recording}.json"
 
     def _stored(self, path: Path | None) -> str | None:

@@ -30,8 +30,9 @@ from gazeloc_app.actions.places import RemoveView, SaveView
 from gazeloc_app.actions.views import ColorCameras, CompareWith, ShowLayer, ThinCameras, TintLayer
 from gazeloc_app.annotation.annotation_json import changes_to_json
 from gazeloc_app.annotation.history import History
+from gazeloc_app.annotation.project_files import annotation_in_files
 from gazeloc_app.annotation.room_saving import RoomSaver
-from gazeloc_app.annotation.saving import IN_THE_JOURNAL, Saver, annotation_in_files
+from gazeloc_app.annotation.saving import IN_THE_JOURNAL, Saver
 from gazeloc_app.app import App
 from gazeloc_app.state import ABOUT_THE_ROOM, Annotation, AppState, Coloring, Layer
 from viser import _messages

@@ -91,8 +91,9 @@ class App:
             self._room = RoomSaver(project.folder, self._say_damage)
             self._settings = UserSettings(self._say_damage)
             first = self._settings.put_into(self.store.state)
-            room = self._saver.room_after_a_kill(self._room.read())
-            self.store.begin(self._saver.open(first.recording).with_room_of(room).put_into(first))
+            history = self._saver.open(first.recording)
+            room = self._saver.room_after_a_kill(self._room.read(history.present))
+            self.store.begin(history.with_room_of(room).put_into(first))
             if first.recording:
                 self.data.recording(first.recording)
             self.live = LiveAlignment(self.data, self.store.dispatch)

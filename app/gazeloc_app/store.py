@@ -29,9 +29,18 @@ class Store:
     a crash could take back; then every view renders; then effects run (they start jobs).
     """
 
-    def __init__(self, state: AppState, batch: Callable[[], AbstractContextManager[object]] = nullcontext):
-        """`batch` wraps the rendering of all views, so that a browser sees it as one change."""
-        self._state = state
+    def __init__(
+        self,
+        state: AppState,
+        batch: Callable[[], AbstractContextManager[object]] = nullcontext,
+        save_again_s: float = 3.0,
+    ):
+        """`batch` wraps the rendering of all views, so that a browser sees it as one change.
+
+        What could not be saved is tried again every `save_again_s`, and once more at the end.
+        """
+        self._state, self._save_again_s = state, save_again_s
+        self._is_unsaved = False
         self._batch = batch
         self._queue: queue.SimpleQueue[Action | None] = queue.SimpleQueue()
         self._savers: list[Effect] = []
@@ -89,10 +98,27 @@ class Store:
 
     def _run(self) -> None:
         while True:
-            actions = [self._queue.get(), *self._waiting()]
+            try:
+                actions = [self._queue.get(timeout=self._save_again_s if self._is_unsaved else None), *self._waiting()]
+            except queue.Empty:
+                self.save_again()
+                continue
             self._apply_all([action for action in actions if action is not None])
             if None in actions:
+                self.save_again()
                 return
+
+    def save_again(self) -> None:
+        """Where something could not be saved, try again; once it is, say so."""
+        if not self._is_unsaved:
+            return
+        failing, self._is_unsaved = self._state, False
+        self._run_all([*self._savers, *self._effects], failing, failing)
+        if self._is_unsaved:
+            self._state = failing  # it says so already
+        else:
+            self._state = self._state.noticed(Level.INFO, "Your last changes are saved now.")
+            self._render()
 
     def _waiting(self) -> list[Action | None]:
         actions: list[Action | None] = []
@@ -141,6 +167,7 @@ class Store:
             try:
                 effect(before, after)
             except GazelocError as error:
+                self._is_unsaved = True
                 self._state = self._state.noticed(Level.ERROR, str(error))
             except Exception as error:
                 log.exception("after an action")

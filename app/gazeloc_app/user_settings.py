@@ -28,10 +28,12 @@ class UserSettings:
     def __init__(self, say: Callable[[str], None] = _log.warning):
         """`say` is told of a file that cannot be read; everything is as usual then."""
         self._say = say
+        self._written = False
 
     def put_into(self, state: AppState) -> AppState:
         """The state with the user's settings."""
-        return replace(state, are_colors_safe=self._read())
+        self._written = self._read()
+        return replace(state, are_colors_safe=self._written)
 
     def save(self, before: AppState, after: AppState) -> None:
         """Write them where they changed.
@@ -39,16 +41,18 @@ class UserSettings:
         Raises:
             GazelocError: if that fails.
         """
+        del before
         is_on = after.are_colors_safe
-        if is_on == before.are_colors_safe:
+        if is_on == self._written:
             return
         path = settings_path()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_json_atomically(path, {_SAFE_COLORS: is_on})
+            self._written = is_on
         except OSError as error:
             raise GazelocError(
-                f"{path}: your choice of colours could not be kept ({error.strerror}); it is lost with this run."
+                f"{path}: your choice of colours could not be kept ({error.strerror}); it is tried again."
             ) from error
 
     def _read(self) -> bool:

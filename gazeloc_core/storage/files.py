@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +67,37 @@ def write_json_atomically(path: Path, value: Any) -> None:
     write_text_atomically(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
+def put_aside(path: Path) -> Path:
+    """Rename a file or folder that is of no use to `<name>.damaged-<time>`; where it is now, beside earlier ones.
+
+    Raises:
+        InputError: if that fails.
+    """
+    place = _free_place(path, f"damaged-{datetime.now():%Y%m%d-%H%M%S}")
+    try:
+        path.rename(place)
+    except OSError as error:
+        problem = f"it is damaged and cannot be put aside ({error.strerror})"
+        raise InputError.of(path, problem, "move it elsewhere, or mend the folder's permissions") from error
+    return place
+
+
+def copy_aside(path: Path) -> Path:
+    """Copy a file that is about to be replaced to `<name>.other-<time>`; where the copy is, beside earlier ones.
+
+    Raises:
+        OSError: if that fails.
+    """
+    place = _free_place(path, f"other-{datetime.now():%Y%m%d-%H%M%S}")
+    shutil.copy2(path, place)
+    return place
+
+
+def _free_place(path: Path, word: str) -> Path:
+    endings = itertools.chain([word], (f"{word}-{number}" for number in itertools.count(2)))
+    return next(place for place in (path.with_name(f"{path.name}.{one}") for one in endings) if not place.exists())
+
+
 @contextmanager
 def folder_replaced_atomically(folder: Path) -> Iterator[Path]:
     """A new empty folder to write into that takes the place of `folder` when the block ends well.
@@ -117,5 +150,5 @@ def read_json(path: Path, what: str) -> Any:
         raise InputError.of(path, f"the file is missing; it should hold {what}", "restore it") from error
     except (OSError, UnicodeDecodeError) as error:
         raise InputError.of(path, f"the file cannot be read ({error})", "restore it or its permissions") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError.of(path, f"the file is not valid JSON ({error})", "restore or export it again") from error

@@ -23,7 +23,17 @@ class Journal:
         self.path = path
         self._end = 0
         """Bytes of whole lines."""
+        self._left: tuple[int, int] | None = None
+        """Which file it was (its inode) and how long, None where there was none."""
         self.read()
+
+    @property
+    def is_as_left(self) -> bool:
+        """Whether the file is the one that was read or written last: others may have replaced or cut it."""
+        try:
+            return self._left == _inode_and_size(self.path.stat())
+        except OSError:
+            return self._left is None
 
     def read(self) -> list[Any]:
         """The values of all whole lines, in order; none where there is no file.
@@ -38,10 +48,11 @@ class Journal:
         except OSError as error:
             raise InputError.of(self.path, f"the file cannot be read ({error.strerror})", "mend that") from error
         self._end = data.rfind(b"\n") + 1
+        self._left = _inode_and_size(self.path.stat())
         lines = data[: self._end].splitlines()
         try:
-            return [json.loads(line) for line in lines]
-        except ValueError as error:
+            return [json.loads(line.decode("utf-8")) for line in lines]
+        except (ValueError, RecursionError) as error:
             raise InputError.of(self.path, f"a line is not valid JSON ({error})", "restore the file") from error
 
     def append(self, values: Iterable[Any], *, flush: bool = True) -> None:
@@ -61,6 +72,7 @@ class Journal:
             if flush:
                 os.fsync(file)
         finally:
+            self._left = _inode_and_size(os.fstat(file))
             os.close(file)
         if flush and is_new:
             flush_folder(self.path.parent)
@@ -70,7 +82,11 @@ class Journal:
         """Replace all lines in one step."""
         data = b"".join(_line(value) for value in values)
         write_text_atomically(self.path, data.decode("utf-8"))
-        self._end = len(data)
+        self._end, self._left = len(data), _inode_and_size(self.path.stat())
+
+
+def _inode_and_size(status: os.stat_result) -> tuple[int, int]:
+    return status.st_ino, status.st_size
 
 
 def _line(value: Any) -> bytes:

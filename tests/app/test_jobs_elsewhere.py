@@ -12,7 +12,8 @@ from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.history import Undo
 from gazeloc_app.actions.jobs import CancelJob, JobEnded, JobProgressed, StartJob
 from gazeloc_app.actions.picks import PickPoint, Side
-from gazeloc_app.annotation.saving import Saver, annotation_in_files
+from gazeloc_app.annotation.project_files import annotation_in_files
+from gazeloc_app.annotation.saving import Saver
 from gazeloc_app.app import App
 from gazeloc_app.newest import Newest
 from gazeloc_app.panels.alignment import AlignmentPanel

@@ -11,7 +11,8 @@ from gazeloc_app.actions.history import Redo, Undo
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.annotation import saving
 from gazeloc_app.annotation.history import History, read_lines
-from gazeloc_app.annotation.saving import Saver, annotation_in_files
+from gazeloc_app.annotation.project_files import annotation_in_files
+from gazeloc_app.annotation.saving import Saver
 from gazeloc_app.state import AppState, Level
 from gazeloc_app.store import Store
 

@@ -126,9 +126,9 @@ def test_a_damaged_file_of_views_is_put_aside_and_said(project):
     try:
         app.store.step()
         assert app.store.state.annotation.views == ()
-        assert "colors.damaged.json" in app.store.state.notice.text
-        assert (project.folder / "views.damaged.json").read_text() == "{"
-        assert (project.folder / "colors.damaged.json").read_text() == '{"format": "gazeloc-layer-colors"}'
+        assert "colors.json.damaged-" in app.store.state.notice.text
+        kept = {path.name.split(".")[0]: path.read_text() for path in project.folder.glob("*.damaged-*")}
+        assert kept == {"views": "{", "colors": '{"format": "gazeloc-layer-colors"}'}
         step(app, SaveView(DESK))
         assert read_views(project.folder) == (DESK,)
     finally:

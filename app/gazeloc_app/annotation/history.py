@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 from gazeloc_app.annotation.annotation_json import changed_from_json, changes_to_json
 from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
@@ -107,17 +107,28 @@ def lines_between(before: History, after: History) -> list[dict[str, Any]]:
     return [*going, *_steps(steps), *_going(read.position, after.position)]
 
 
-def read_lines(lines: Iterable[Any]) -> tuple[History, bool]:
-    """The history that a journal's lines hold, and whether it is settled.
+class Read(NamedTuple):
+    """What a journal's lines hold."""
+
+    history: History
+    is_settled: bool
+    passed: tuple[Annotation, ...]
+    """What was in force when it was settled last, and since: the project's own files may say any of these."""
+
+
+def read_lines(lines: Iterable[Any]) -> Read:
+    """The history that a journal's lines hold, and how far it is settled.
 
     Raises:
         InputError: if they are garbled, or of another version.
     """
     history: History | None = None
+    passed: list[Annotation] = []
     is_settled = False
     try:
         for line in lines:
             is_settled = "settled" in line
+            passed = [] if is_settled else passed
             if "start" in line:
                 history = _started(line)
             elif history is None:
@@ -126,11 +137,12 @@ def read_lines(lines: Iterable[Any]) -> tuple[History, bool]:
                 history = history.then(changed_from_json(history.present, line["step"]))
             elif "go" in line:
                 history = History(history.annotations, _checked_position(history, line["go"]))
+            passed.append(history.present)
     except (TypeError, KeyError) as error:
         raise InputError(f"The history is garbled ({error}).") from error
     if history is None:
         raise InputError("The history is empty.")
-    return history, is_settled
+    return Read(history, is_settled, tuple(passed))
 
 
 def _started(line: Any) -> History:

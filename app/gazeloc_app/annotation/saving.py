@@ -4,7 +4,8 @@ A step is acknowledged when views render it. Before that its line is in the reco
 (`commit`); if that fails, the state is shown with a notice that says so, and every further action tries again. After
 rendering, the files that the stages and the command line read (keypoints, project.json) are brought up to the journal
 (`settle`), which is then marked as settled. A start that finds the mark missing was killed in between: the journal
-wins. A start that finds it, but other files, follows the files: somebody changed them by other means.
+wins, unless the files say what it never said: then it lacks its end. A start that finds the mark, but other files,
+follows the files: somebody changed them by other means. Either way what the journal says is a step before.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ import json
 import logging
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 
-from gazeloc_app.annotation.history import History, all_lines, lines_between, read_lines
+from gazeloc_app.annotation.history import History, Read, all_lines, lines_between, read_lines
+from gazeloc_app.annotation.project_files import ProjectFiles, are_explained
 from gazeloc_app.state import ABOUT_THE_ROOM, MAX_UNDO, Annotation, AppState
 from gazeloc_core.errors import GazelocError, ProjectError
-from gazeloc_core.project import Chosen, Project
+from gazeloc_core.project import Project
+from gazeloc_core.storage.files import put_aside
 from gazeloc_core.storage.journal import Journal
 
 MAX_LINES = 4 * MAX_UNDO
@@ -36,6 +38,7 @@ class Saver:
     def __init__(self, project: Project, say: Callable[[str], None] = _log.warning):
         self._project = project
         self._say = say
+        self._files = ProjectFiles(project, say)
         self._journals: dict[str, Journal] = {}
         self._lines: dict[str, int] = {}
         self._committed: dict[str, History] = {}
@@ -53,24 +56,31 @@ class Saver:
         if not recording:
             self._committed[recording] = self._wanted[recording] = History((Annotation(),), 0)
             return self._wanted[recording]
-        files = annotation_in_files(self._project, recording)
-        try:
-            journal = Journal(self._project.history_path(recording))
-            lines = journal.read()
-            history, is_settled = read_lines(lines) if lines else (History((files,), 0), True)
-        except GazelocError as error:
-            journal, lines = self._put_aside(recording, error), []
-            history, is_settled = History((files,), 0), True
-        self._journals[recording], self._lines[recording] = journal, len(lines)
+        read = self._open_journal(recording)
+        files, are_whole = self._files.read(recording, read.history.present if read else Annotation())
+        history = read.history if read else History((files,), 0)
         self._committed[recording] = self._wanted[recording] = history
-        if not is_settled:
+        if not are_whole or (read is not None and not read.is_settled):
             self._unsettled.add(recording)
-        else:
+        if read is None or read.is_settled or not are_explained(files, read.passed):
             elsewhere = (*ABOUT_THE_ROOM, *IN_THE_JOURNAL)
             files = replace(files, **{name: getattr(history.present, name) for name in elsewhere})
             if history.present != files:
                 self._wanted[recording] = history.then(files)
         return self._wanted[recording]
+
+    def _open_journal(self, recording: str) -> Read | None:
+        """What a recording's journal holds; None where it has none, or a damaged one, which is put aside."""
+        path, read, lines = self._project.history_path(recording), None, []
+        try:
+            journal = Journal(path)
+            lines = journal.read()
+            if lines or path.exists():  # a new one is put in place whole, so that none is ever without a line
+                read = read_lines(lines)
+        except GazelocError as error:
+            journal, lines = self._put_aside(recording, error), []
+        self._journals[recording], self._lines[recording] = journal, len(lines)
+        return read
 
     def room_after_a_kill(self, room: Annotation) -> Annotation:
         """What was decided about the room: as its files have it (`room`), or as a journal that a kill left unsettled.
@@ -102,6 +112,7 @@ class Saver:
             annotation = elsewhere.present.with_suggested(suggested)
             if annotation is not elsewhere.present:
                 self._wanted[suggested.recording] = elsewhere.then(annotation)
+        self._project.check_is_there()
         for name, wanted in self._wanted.items():
             if wanted is not self._committed[name]:
                 try:
@@ -118,7 +129,7 @@ class Saver:
         del before, after
         for name in sorted(self._unsettled):
             try:
-                _write_files(self._project, name, self._committed[name].present)
+                self._files.write(name, self._committed[name].present)
                 self._journals[name].append([{"settled": True}], flush=False)
             except OSError as error:
                 raise self._unsavable(error) from error
@@ -130,7 +141,10 @@ class Saver:
             self._committed[name] = wanted
             return
         journal, committed = self._journals[name], self._committed[name]
-        if self._lines[name] == 0 or self._lines[name] > MAX_LINES:
+        if not journal.is_as_left and journal.path.exists():
+            aside = put_aside(journal.path)
+            self._say(f"{journal.path}: somebody else replaced this file; it was put aside as {aside.name}.")
+        if not 0 < self._lines[name] <= MAX_LINES or not journal.is_as_left:
             lines = all_lines(wanted)
             journal.rewrite(lines)
             self._lines[name] = len(lines)
@@ -143,12 +157,9 @@ class Saver:
 
     def _put_aside(self, recording: str, error: GazelocError) -> Journal:
         path = self._project.history_path(recording)
-        aside = path.with_name(f"{path.name}.damaged-{datetime.now():%Y%m%d-%H%M%S}")
-        try:
-            path.rename(aside)
-        except OSError as failure:
-            raise ProjectError(f"{path}: {error} It cannot be put aside either ({failure.strerror}).") from error
-        self._say(f"{path}: {error} It was put aside as {aside.name}; undo begins anew, the keypoints are unharmed.")
+        aside = put_aside(path)
+        about = str(error) if str(path) in str(error) else f"{path}: {error}"
+        self._say(f"{about} It was put aside as {aside.name}; undo begins anew, the keypoints are unharmed.")
         return Journal(path)
 
     def _unsavable(self, error: OSError) -> ProjectError:
@@ -156,18 +167,6 @@ class Saver:
             f"{self._project.folder}: your last changes could not be saved ({error.strerror}); free some space "
             "or mend the folder's permissions and go on, they are kept until then."
         )
-
-
-def annotation_in_files(project: Project, recording: str) -> Annotation:
-    """What the project's own files say that people decided about a recording; the room has files of its own."""
-    chosen = project.settings.chosen.get(recording)
-    return Annotation(
-        project.keypoints(recording),
-        alignment=chosen.alignment if chosen else None,
-        alignment_by_person=bool(chosen and chosen.by_person),
-        method=project.method(recording),
-        marks=project.marks(recording),
-    )
 
 
 def _ends_settled(journal: Path) -> bool:
@@ -183,17 +182,3 @@ def _ends_settled(journal: Path) -> bool:
         return not lines or "settled" in json.loads(lines[-1])
     except (ValueError, TypeError):
         return False
-
-
-def _write_files(project: Project, recording: str, annotation: Annotation) -> None:
-    if project.keypoints(recording) != annotation.keypoints:
-        project.save_keypoints(recording, annotation.keypoints)
-    if project.marks(recording) != annotation.marks:
-        project.save_marks(recording, annotation.marks)
-    chosen = None
-    if annotation.alignment is not None:
-        chosen = Chosen(alignment=annotation.alignment, by_person=annotation.alignment_by_person)
-    if project.settings.chosen.get(recording) != chosen:
-        project.choose(recording, chosen)
-    if project.method(recording) is not annotation.method:
-        project.choose_method(recording, annotation.method)

@@ -66,7 +66,7 @@ class ViewMemory:
     def save(self) -> None:
         """Write what changed. A view that cannot be written is worth no more than a line in the log."""
         with self._lock:
-            if not self._is_changed:
+            if not self._is_changed or not self._path.parent.is_dir():  # one made anew would hide that it was moved
                 return
             self._is_changed = False
             values = {browser: asdict(view) for browser, view in self._views.items()}

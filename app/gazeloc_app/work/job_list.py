@@ -63,6 +63,7 @@ class JobList:
         new = _to_json(after)
         if new == self._on_disk:
             return
+        Project(self._path.parent).check_is_there()
         try:
             write_json_atomically(self._path, {"version": VERSION, "jobs": new})
             self._on_disk = new
