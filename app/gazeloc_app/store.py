@@ -113,7 +113,8 @@ class Store:
         if not self._is_unsaved:
             return
         failing, self._is_unsaved = self._state, False
-        self._run_all([*self._savers, *self._effects], failing, failing)
+        self._save(failing, failing)
+        self._run_effects(failing, failing)
         if self._is_unsaved:
             self._state = failing  # it says so already
         else:
@@ -171,6 +172,7 @@ class Store:
                 self._state = self._state.noticed(Level.ERROR, str(error))
             except Exception as error:
                 log.exception("after an action")
+                self._is_unsaved |= effects is self._savers
                 self._state = self._state.noticed(Level.ERROR, f"{failed}: {error}.")
 
     def _render(self) -> None:
