@@ -11,6 +11,7 @@ from gazeloc_core.errors import InputError
 from gazeloc_core.progress import Report, part, silent
 from gazeloc_core.readers import arkitscenes, image_folder, mesh_file, pupil_cloud, scanner_app
 from gazeloc_core.readers.depth_check import DepthAgreement, depth_agreement
+from gazeloc_core.readers.gaze_check import check_gaze
 from gazeloc_core.recording import Recording
 from gazeloc_core.scan import RoomScan
 from gazeloc_core.surfaces.scan_colors import color_from_frames
@@ -93,7 +94,8 @@ def open_recording(path: Path, *, report: Report = silent) -> Recording:
     kind, why = _recognised(path, RECORDING_FORMATS, "recording")
     report(0.1, f"reading {path.name}")
     recording = kind.read(path)
-    return replace(recording, notes=(f"Recognised as {kind.name}: {why}.", *recording.notes))
+    notes = (f"Recognised as {kind.name}: {why}.", *recording.notes, *check_gaze(recording))
+    return replace(recording, notes=notes)
 
 
 def _recognised(path: Path, kinds: tuple[Kind, ...], what: str) -> tuple[Kind, str]:
