@@ -70,6 +70,6 @@ def test_views_and_tints_are_kept_and_undone_and_nothing_is_written_for_a_record
 def test_a_click_measures_or_goes_to_a_camera_and_never_sets_a_keypoint(app):
     assert kinds_for(app.store.state) == (CameraTool, TapeTool)
     assert kinds_for(replace(app.store.state, recordings=("walk",), recording="walk")) == TOOLS
-    tools = {kind.name: kind(MagicMock()) for kind in kinds_for(app.store.state)}
+    tools = {kind.name: kind(MagicMock(data=app.data)) for kind in kinds_for(app.store.state)}
     for tool in tools.values():
         assert shifted(tool, tools) is tool
