@@ -52,8 +52,9 @@ class Mesh:
             bad = int((~np.isfinite(vertices).all(axis=1)).sum())
             raise InputError(f"The mesh has {bad} vertices that are not finite; export it again.")
         if faces.min() < 0 or faces.max() >= len(vertices):
+            wrong = int(faces.min()) if faces.min() < 0 else int(faces.max())
             raise InputError(
-                f"The mesh has faces that name vertex {int(faces.max())}, but only {len(vertices)} vertices; "
+                f"The mesh has faces that name vertex {wrong}, but only {len(vertices)} vertices; "
                 "the file is truncated, export it again."
             )
         object.__setattr__(self, "vertices", vertices)

@@ -17,11 +17,12 @@ import viser
 
 from gazeloc_app.actions.action import Notify
 from gazeloc_app.actions.choices import OpenRecording
-from gazeloc_app.actions.jobs import JobEnded, OfferJobs, StartJob
+from gazeloc_app.actions.jobs import OfferJobs, StartJob
 from gazeloc_app.actions.views import NameRenderer
 from gazeloc_app.annotation.room_saving import RoomSaver
 from gazeloc_app.annotation.saving import Saver
 from gazeloc_app.browser import Browser
+from gazeloc_app.browsers import Browsers
 from gazeloc_app.data import ProjectData
 from gazeloc_app.door.address import link_host
 from gazeloc_app.door.login import needs_token, new_token
@@ -41,7 +42,6 @@ from gazeloc_app.panels.help import HelpPanel
 from gazeloc_app.people.view_memory import ViewMemory
 from gazeloc_app.people.visitors import Visitors
 from gazeloc_app.routes import Routes, add_picture_routes, add_static_route
-from gazeloc_app.scene.kept import EVERYTHING, Kept
 from gazeloc_app.scene_view import SceneView
 from gazeloc_app.server import make_server
 from gazeloc_app.state import AppState, Level
@@ -50,6 +50,7 @@ from gazeloc_app.user_settings import UserSettings
 from gazeloc_app.work import tasks
 from gazeloc_app.work.follow_up import ScoreAfterRun
 from gazeloc_app.work.job_list import JobList
+from gazeloc_app.work.job_starter import JobStarter
 from gazeloc_app.work.jobs import JobRunner
 from gazeloc_core import pipeline
 from gazeloc_core.errors import GazelocError
@@ -110,29 +111,25 @@ class App:
                 allow_hosts=allow_hosts,
                 token=self._token,
             )
+            undo.callback(self.server.stop)
+            self.browsers = Browsers(self._make_browser, lambda client: Look(client, self.panels.handles))
+            self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch, self.browsers.kept)
+            self.panels = Panels(self._desk())
+            self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
+            self._first_pose = FirstPose(self.data, self.store.dispatch)
+            self._join()
             undo.pop_all()
-        self._browsers: dict[int, Browser] = {}
-        self._looks: dict[int, Look] = {}
-        self._last_job = 0
-        self.scene = SceneView(self.server, self.data, self._render, self.store.dispatch, self._kept)
-        self.store.add_view(self.scene.render)
-        self._player = Player(self.data, lambda: self.store.state, self.store.dispatch)
-        self.panels = Panels(self._desk())
-        for panel in self.panels:
-            self.store.add_view(panel.render)
-        self._first_pose = FirstPose(self.data, self.store.dispatch)
-        self.store.add_view(self._render_browsers)
-        self.store.add_view(self._visitors.render)
-        self.store.add_saver(self._saver.commit)
-        self.store.add_saver(self._room.save)
-        self.store.add_saver(self._job_list.save)
-        self.store.add_saver(self._settings.save)
-        self.store.add_effect(self._saver.settle)
-        self.store.add_effect(self._start_job)
-        self.store.add_effect(self.live.follow)
-        self.store.add_effect(self._cancel_job)
-        self.store.add_effect(self._first_pose)
-        self.store.add_effect(self._player.notice)
+
+    def _join(self) -> None:
+        """Tell the store and the server whom to call; savers, views and effects are called in this order."""
+        for save in (self._saver.commit, self._room.save, self._job_list.save, self._settings.save):
+            self.store.add_saver(save)
+        panels = [panel.render for panel in self.panels]
+        for render in (self.scene.render, *panels, self.browsers.render, self._visitors.render):
+            self.store.add_view(render)
+        start_job = JobStarter(self.jobs, self.store.dispatch, lambda: self._saver.has_unsaved)
+        for effect in (self._saver.settle, start_job, self.live.follow, self._first_pose, self._player.notice):
+            self.store.add_effect(effect)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 
@@ -179,9 +176,9 @@ class App:
             scene=self.scene,
             state=self.store.state,
             dispatch=self.store.dispatch,
-            browser=lambda client_id: self._browsers.get(client_id),
+            browser=self.browsers.get,
             open_recording=Newest(self._open_recording, "gazeloc-open").ask,
-            toggle_look=self._toggle_look,
+            toggle_look=self.browsers.toggle_look,
             export_folder=self.export_folder,
         )
 
@@ -210,31 +207,17 @@ class App:
     def _say_trouble(self, sentence: str) -> None:
         self.store.dispatch(Notify(Level.WARNING, sentence))
 
+    def _make_browser(self, client: viser.ClientHandle) -> Browser:
+        return Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
+
     async def _connected(self, client: viser.ClientHandle) -> None:
-        browser = Browser(client, self.data, self.scene, self._render, lambda: self.store.state, self.store.dispatch)
-        self._browsers[client.client_id] = browser
-        self._looks[client.client_id] = look = Look(client, self.panels.handles)
+        browser = self.browsers.come(client)
         self.panels.of(HelpPanel).show((self.server.gui, client.gui))
-        look.remember()
         self._visitors.come(client, browser, self.store.state)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
-        self._browsers.pop(client.client_id, None)
-        self._looks.pop(client.client_id, None)
+        self.browsers.go(client)
         self._visitors.go(client)
-
-    def _render_browsers(self, state: AppState) -> None:
-        for browser in list(self._browsers.values()):
-            browser.render(state)
-
-    def _toggle_look(self, client_id: int) -> None:
-        look = self._looks.get(client_id)
-        if look is not None:
-            look.toggle()
-
-    def _kept(self, client_id: int) -> Kept:
-        browser = self._browsers.get(client_id)
-        return EVERYTHING if browser is None else browser.kept
 
     def _open_recording(self, name: str) -> None:
         """Reads the recording's files, so not for viser's loop."""
@@ -244,22 +227,6 @@ class App:
             self.store.dispatch(OpenRecording(name, lambda: self._saver.open(name)))
         except GazelocError as error:
             self.store.dispatch(Notify(Level.ERROR, str(error)))
-
-    def _start_job(self, before: AppState, after: AppState) -> None:
-        del before
-        if after.job is None or after.job.number == self._last_job:
-            return
-        self._last_job = after.job.number
-        if self._saver.has_unsaved:
-            text = f"“{after.job.name}” was not begun: it reads the project's files, and those could not be saved."
-            self.store.dispatch(JobEnded(Level.ERROR, text))
-        else:
-            self.jobs.start(after.job.name, after.job.task, **dict(after.job.keywords))
-
-    def _cancel_job(self, before: AppState, after: AppState) -> None:
-        del before
-        if after.job is not None and after.job.is_cancelling and after.job.number == self._last_job:
-            self.jobs.cancel()
 
 
 def serve(

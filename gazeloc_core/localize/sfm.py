@@ -127,9 +127,10 @@ def frame_mask(indices: Ints, count: int, what: str) -> Bools:
         GeometryError: if a frame is not of the recording or named twice; `what` names them in the sentence.
     """
     mask = np.zeros(count, dtype=np.bool_)
-    if len(indices) and (indices.min() < 0 or indices.max() >= count):
+    outside = indices[(indices < 0) | (indices >= count)]
+    if len(outside):
         raise GeometryError(
-            f"The {what} name frame {int(indices.max())}, but the recording has {count} frames; "
+            f"The {what} name frame {int(outside[0])}, but the recording has {count} frames; "
             "check that they belong to this recording."
         )
     mask[indices] = True

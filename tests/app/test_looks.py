@@ -41,10 +41,10 @@ def while_connected(app, look):
 
     async def talk():
         async with page(app.server.get_port()) as visitor:
-            known = set(app._looks)
+            known = set(app.browsers)
             await visitor.send(CAMERA)
-            await until(lambda: set(app._looks) - known)
-            (client_id,) = set(app._looks) - known
+            await until(lambda: set(app.browsers) - known)
+            (client_id,) = set(app.browsers) - known
             return look(app.server.get_clients()[client_id])
 
     return asyncio.run(talk())
@@ -88,7 +88,7 @@ def test_so_does_what_is_in_our_own_html(app, monkeypatch):
 
 def test_moving_a_point_is_offered_while_a_pair_is_selected(app):
     def look(client):
-        browser, offered = app._browsers[client.client_id], []
+        browser, offered = app.browsers[client.client_id], []
         for action in (SelectPair(None), PickPoint(Side.SCAN, (1, 2, 0.5)), Undo()):
             step(app, action)
             browser.render(app.store.state)
@@ -224,9 +224,9 @@ def test_a_tablets_panels_are_narrower_once_and_upright_one_is_folded_up(app, mo
 
     async def talk():
         async with page(app.server.get_port()) as visitor:
-            known = set(app._looks)
+            known = set(app.browsers)
             await visitor.send(CAMERA)
-            await until(lambda: set(app._looks) - known)
+            await until(lambda: set(app.browsers) - known)
             for fov, width_px in zip((0.81, 0.82, 0.83), widths_px, strict=True):
                 await visitor.send(CAMERA | {"image_width": width_px, "fov": fov})
             await until(lambda: any(c.camera.fov == 0.83 for c in app.server.get_clients().values()))

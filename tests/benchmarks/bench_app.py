@@ -95,7 +95,7 @@ def bench_clicks(browser: Browser, app: App, count: int = 20) -> Row:
     """Clicks on the canvas from 3 m: the keypoint against the true surface point."""
     viewer = _open(browser, app)
     _take(viewer, app, ScanPointTool.name)
-    (page,) = app._browsers.values()
+    (page,) = app.browsers.values()
     errors = []
     for point, eye in _targets(app, count):
         with page._client.atomic():
@@ -138,7 +138,7 @@ _EMPTY = "/empty"
 
 def _time_click(viewer: ViewerPage, app: App, point: Floats, which: str) -> float:
     node = "/keypoints/k1/scan" if which == "app" else _EMPTY
-    (page,) = app._browsers.values()
+    (page,) = app.browsers.values()
     if which == "empty":
         page.click = lambda click, **_: app.server.scene.add_icosphere(  # type: ignore[method-assign, assignment]
             _EMPTY, radius=0.035, color=(255, 0, 200), subdivisions=2, position=click.origin
@@ -225,7 +225,7 @@ def _open(browser: Browser, app: App) -> ViewerPage:
 
 
 def _take(viewer: ViewerPage, app: App, name: str) -> None:
-    for page in app._browsers.values():
+    for page in app.browsers.values():
         page._choice.value, page._snap.value = name, False
     viewer.page.wait_for_timeout(300)
 

@@ -70,7 +70,12 @@ def test_no_registered_image_gives_no_pose():
 
 @pytest.mark.parametrize(
     ("frames", "keyframes", "sentence"),
-    [([0, 9], [0], "name frame 9"), ([1, 1], [0], "frame 1 twice"), ([0, 1], [7], "keyframes name frame 7")],
+    [
+        ([0, 9], [0], "name frame 9"),
+        ([0, 1], [-2, 1], "keyframes name frame -2"),
+        ([1, 1], [0], "frame 1 twice"),
+        ([0, 1], [7], "keyframes name frame 7"),
+    ],
 )
 def test_a_model_of_another_recording_is_refused(frames, keyframes, sentence):
     room, model = model_of(frames)

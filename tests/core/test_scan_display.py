@@ -26,6 +26,12 @@ def project(tmp_path):
     return Project.create(tmp_path / "project", Settings(scan=scan, recordings={"a": RecordingEntry(path=tmp_path)}))
 
 
+@pytest.mark.parametrize("vertex", [-1, 7])
+def test_a_face_that_names_no_vertex_is_told_by_the_one_that_it_names(vertex):
+    with pytest.raises(InputError, match=f"name vertex {vertex}, but only 3"):
+        Mesh(np.eye(3), np.array([[0, 1, vertex]]))
+
+
 def test_what_is_kept_is_what_was_made(project):
     assert load_display(project) is None
     made, kept = make_display(project), load_display(project)

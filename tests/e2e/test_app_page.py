@@ -89,7 +89,7 @@ def test_dragging_in_pick_mode_orbits_and_makes_nothing(open_app):
 def test_the_tool_is_of_one_browser_and_a_reload_forgets_nothing(open_app):
     first, second = open_app(), open_app()
     first.choose("A click", ScanPointTool.name)
-    first.viewer.wait_until(lambda: any(isinstance(b.tool, ScanPointTool) for b in first.app._browsers.values()))
+    first.viewer.wait_until(lambda: any(isinstance(b.tool, ScanPointTool) for b in first.app.browsers.values()))
     second.viewer.click_at_point(SPOTS[0])
     second.page.wait_for_timeout(700)
     assert not first.pairs
@@ -154,7 +154,7 @@ def test_one_spot_clicked_in_two_frames_is_a_keypoint_by_triangulation(open_app)
         else:
             page.press("Look through this camera")
         page.viewer.wait_for_node("/picture").wait_until_drawn(2)
-        camera, browser = page.app.data.camera("walk"), next(iter(page.app._browsers.values()))
+        camera, browser = page.app.data.camera("walk"), next(iter(page.app.browsers.values()))
         page.until(lambda frame=frame, browser=browser: browser.looking.target == ("walk", frame))
         page.page.wait_for_timeout(1500)
         page.viewer.settle().save(f"app-look-through-{frame}")

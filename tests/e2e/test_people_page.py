@@ -51,7 +51,7 @@ def rest(viewer: ViewerPage) -> np.ndarray:
 
 
 def tool_names(page):
-    return tuple(next(iter(page.app._browsers.values()))._tools)
+    return tuple(next(iter(page.app.browsers.values()))._tools)
 
 
 def selected_tab(page):

@@ -48,7 +48,7 @@ def test_one_spot_in_two_of_the_phones_pictures_is_a_place_on_the_scan(page):
         page.until(
             lambda number=number: any(
                 browser.looking.target and browser.looking.target.frame == number
-                for browser in page.app._browsers.values()
+                for browser in page.app.browsers.values()
             )
         )
         page.viewer.wait_until_drawn(300)

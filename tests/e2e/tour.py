@@ -91,7 +91,7 @@ def _walk(page: AppPage, app: App) -> None:
     _show(page, app, int(registered[len(registered) // 2]))
     page.tab("Layers")
     for client in app.server.get_clients().values():
-        app._browsers[client.client_id].look(app.store.state.frame)
+        app.browsers[client.client_id].look(app.store.state.frame)
     _shoot(page, "frame")
 
 

@@ -39,16 +39,19 @@ class LiveAlignment:
         self._wanted: _Wanted | None = None
         self._change = threading.Condition()
         self._ended = False
+        self._thread = threading.Thread(target=self._run, name="gazeloc-live", daemon=True)
 
     def start(self) -> None:
         """Fit on a thread of its own until `stop()`."""
-        threading.Thread(target=self._run, name="gazeloc-live", daemon=True).start()
+        self._thread.start()
 
     def stop(self) -> None:
-        """End the thread."""
+        """End the thread: when this returns, nothing is written to the project any more."""
         with self._change:
             self._ended = True
             self._change.notify()
+        if self._thread.is_alive():
+            self._thread.join()
 
     def follow(self, before: AppState, after: AppState) -> None:
         """An effect of the store: ask for a fit where the keypoints that count changed, or a person asked."""
