@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
 import re
@@ -100,18 +101,20 @@ def merged(present: KeypointSet, read: KeypointSet) -> KeypointSet:
 
     So the two sides of pairs may come from two lists, and a list that is read twice changes nothing the second time.
     """
+    pairs, key_of = {pair.key: pair for pair in present}, {pair.name: pair.key for pair in reversed(present.pairs)}
+    new_keys = (f"k{number}" for number in itertools.count(int(present.next_key()[1:])))
     for pair in read:
-        same = next((known for known in present if known.name == pair.name), None)
-        if same is None:
-            present = present.add(replace(pair, key=present.next_key()))
+        if pair.name not in key_of:
+            key = key_of[pair.name] = next(new_keys)
+            pairs[key] = replace(pair, key=key)
             continue
         fields: dict[str, Any] = {}
         if pair.scan is not None or pair.scan_sightings:
             fields |= {"scan": pair.scan, "scan_sightings": pair.scan_sightings, "scan_sigma": pair.scan_sigma}
         if pair.sfm is not None or pair.sightings:
             fields |= {"sfm": pair.sfm, "sightings": pair.sightings, "sfm_sigma": pair.sfm_sigma}
-        present = present.change(same.key, **fields)
-    return present
+        pairs[key_of[pair.name]] = replace(pairs[key_of[pair.name]], **fields)
+    return KeypointSet(tuple(pairs.values()))
 
 
 def to_json_text(keypoints: KeypointSet) -> str:

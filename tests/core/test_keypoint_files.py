@@ -81,6 +81,17 @@ def test_what_is_read_completes_pairs_of_the_same_name_and_is_added_else_and_twi
     assert merged(merged(both, scan), sfm) == both
 
 
+def test_of_two_pairs_of_a_name_the_first_gets_what_was_read_and_new_keys_follow_the_highest():
+    pairs = [KeypointPair("k7", "lamp", scan=(1, 1, 1)), KeypointPair("k2", "lamp")]
+    read = KeypointSet((KeypointPair("k1", "lamp", sfm=(2, 2, 2)), KeypointPair("k2", "desk", scan=(3, 3, 3))))
+    after = merged(KeypointSet(tuple(pairs)), read)
+    assert [(p.key, p.name, p.scan, p.sfm) for p in after] == [
+        ("k7", "lamp", (1, 1, 1), (2, 2, 2)),
+        ("k2", "lamp", None, None),
+        ("k8", "desk", (3, 3, 3), None),
+    ]
+
+
 def test_the_two_sides_that_cloudcompare_numbers_are_one_pair():
     scan = read_keypoints("ref.txt", b"R0,1,2,3\nR1,4,5,6\n", "scan")
     sfm = read_keypoints("aligned.txt", b"A0,7,8,9\nA1,1,1,1\n", "sfm")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,10 +39,7 @@ def pair_residuals(data: ProjectData, state: AppState) -> dict[str, PairResidual
     complete = [pair for pair in state.annotation.keypoints if pair.is_complete]
     if alignment is None or not complete:
         return {}
-    keypoints = KeypointSet(tuple(complete))
-    for pair in complete:
-        keypoints = keypoints.change(pair.key, enabled=True)
-    pairs = gather(None, None, keypoints)
+    pairs = gather(None, None, KeypointSet(tuple(replace(pair, enabled=True) for pair in complete)))
     distances = np.linalg.norm(alignment.scan_from_sfm.apply(pairs.sfm) - pairs.scan, axis=1)
     pixels = np.full(len(pairs), np.nan) if model is None else reprojection_px(alignment.scan_from_sfm, pairs, model)
     counting = gather(data.scan_tags(), data.sfm_tags(state.recording), state.annotation.keypoints)
