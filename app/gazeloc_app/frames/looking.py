@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -46,6 +47,8 @@ class Looking:
         self._client, self._data, self._render = client, data, render
         self._state, self._dispatch = state, dispatch
         self._picture = FrameInSceneLayer(client.scene)
+        self._showing = threading.Lock()
+        """Held while the picture is put up or taken away: it comes from another thread than the wish to leave."""
         self.target: Target | None = None
         """What is looked through now; None for the room from outside."""
         self.follows = True
@@ -85,16 +88,18 @@ class Looking:
 
     def leave(self) -> None:
         """Take the frame's picture away; the camera stays."""
-        self.target = None
-        self._picture.show(None, None, None)
+        with self._showing:
+            self.target = None
+            self._picture.show(None, None, None)
 
     def show_picture(self, is_on: bool) -> None:
         """Put the picture before the view, or take it away; the view stays at the camera."""
-        self.shows_picture = is_on
-        at = self.target
-        if not is_on:
-            self._picture.show(None, None, None)
-        elif at is not None and at.recording is None:
+        with self._showing:
+            self.shows_picture = is_on
+            if not is_on:
+                self._picture.show(None, None, None)
+        at = self.target if is_on else None
+        if at is not None and at.recording is None:
             self.look_with_phone(at.frame)
         elif at is not None:
             self.look(at.frame)
@@ -137,8 +142,9 @@ class Looking:
             self._client.camera.position = view.position
 
         def paste(image: Any) -> None:
-            if self.pictured == target:
-                self._picture.show(pose, camera, image)
+            with self._showing:
+                if self.pictured == target:
+                    self._picture.show(pose, camera, image)
 
         future = self._render.submit(job, key=f"look {self._client.client_id}")
         future.add_done_callback(when_picture(paste))

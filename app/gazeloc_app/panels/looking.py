@@ -5,6 +5,7 @@ They also draw the keypoints onto the picture that is looked through.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -39,6 +40,8 @@ class LookingControls:
         self._data, self._looking, self._state, self._dispatch = data, looking, state, dispatch
         self._marks = FrameMarksLayer(client.scene, self._drag)
         self._drawn: object = None
+        self._drawing = threading.Lock()
+        """The store's loop renders, and so does this page's wish on viser's."""
         photos, gui = len(data.scan().frames_with_images), client.gui
         self._phone: Any = gui.add_slider(
             "Phone's frame",
@@ -93,9 +96,10 @@ class LookingControls:
             widgets.set_value(self._phone, target.frame)
         target = self._looking.pictured
         drawn = (target, state.annotation.keypoints, state.annotation.alignment, selected, state.data_revision)
-        if drawn != self._drawn:
-            self._drawn = drawn
-            self._draw(state, target, selected)
+        with self._drawing:
+            if drawn != self._drawn:
+                self._drawn = drawn
+                self._draw(state, target, selected)
 
     def _draw(self, state: AppState, target: Target | None, selected: str | None) -> None:
         if target is None:
