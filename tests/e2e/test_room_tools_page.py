@@ -71,7 +71,7 @@ def test_two_clicks_measure_a_distance_in_this_browser_alone_and_a_third_begins_
     page.viewer.click_at_point(ends[1])
     page.viewer.wait_for_node("/tape/line")
     page.viewer.save("tape")
-    tapes = [browser.tool for browser in page.app._browsers.values() if isinstance(browser.tool, TapeTool)]
+    tapes = [browser.tool for browser in page.app.browsers.values() if isinstance(browser.tool, TapeTool)]
     measured = [np.linalg.norm(np.subtract(*tape._ends)) for tape in tapes]
     assert measured == pytest.approx([np.linalg.norm(ends[1] - ends[0])], abs=0.02)
     assert not other.page.evaluate("() => !!window.__viserMutable.nodeRefFromName['/tape/line']")
