@@ -41,7 +41,7 @@ class MethodPanel:
             "Method", tuple(Method), hint="Whose poses are red in the scene, rendered, and exported."
         )
         self._summary = gui.add_html("")
-        self._run = gui.add_button("Run this method", hint="Every stage of it that is missing or stale.")
+        self._run = gui.add_button("Run this method", hint="Every stage of it that is to do or outdated.")
         self._table = gui.add_html("")
         with gui.add_folder("Show beside it"):
             self._boxes = {method: gui.add_checkbox(method.value, False, hint=method.summary) for method in Method}

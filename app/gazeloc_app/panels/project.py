@@ -24,6 +24,7 @@ _COLORS = {
     State.MISSING: widgets.MUTED,
     State.FAILED: widgets.BAD,
 }
+_WORDS = {State.FRESH: "done", State.STALE: "outdated", State.MISSING: "to do", State.FAILED: "failed"}
 
 
 class _Wanted(NamedTuple):
@@ -51,7 +52,7 @@ class ProjectPanel:
         )
         widgets.on_user(self._recording, lambda event: open_recording(str(event.target.value)))
         self._run = gui.add_button(
-            "Run everything", hint="Every stage that is missing or stale, from the files to gaze in the room."
+            "Run everything", hint="Every stage that is to do or outdated, from the files to gaze in the room."
         )
         self._dispatch = dispatch
         widgets.on_user(self._run, lambda _: self._run_method(), event="on_click")
@@ -99,7 +100,7 @@ def _running_stage(state: AppState) -> str | None:
 
 
 def _row(status: pipeline.StageStatus, *, is_running: bool) -> list[str]:
-    color, word = _COLORS[status.state], status.state.value
+    color, word = _COLORS[status.state], _WORDS[status.state]
     reason = "" if status.state is State.MISSING else status.reason[:160]  # that it waits, the stages above say
     if is_running and status.state is not State.FRESH:
         color, word, reason = widgets.GOOD, "running", ""
