@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
 
-import cv2
 import numpy as np
 import viser
-from scipy.spatial.transform import RigidTransform
 
 from gazeloc_app.actions.action import Action
 from gazeloc_app.data import ProjectData
-from gazeloc_app.drawing.render_jobs import Frame
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.drawing.scan_screen import ScanScreen
-from gazeloc_app.frames.gaze_at import gaze_in_scan
-from gazeloc_app.frames.settling import Settling
 from gazeloc_app.keypoints.dragging import Cloud, Dragging
 from gazeloc_app.looks import set_background
 from gazeloc_app.once import Once
@@ -26,27 +19,23 @@ from gazeloc_app.palette import FILTERED_OUT, SCAN_TAGS, SFM_TAGS
 from gazeloc_app.placement import shown_scan_from_sfm
 from gazeloc_app.scene.cameras import SceneCameras
 from gazeloc_app.scene.cloud import CloudLayer
-from gazeloc_app.scene.frames import SelectedFrameLayer
-from gazeloc_app.scene.gaze import GazeLayer
 from gazeloc_app.scene.grid import GridLayer
 from gazeloc_app.scene.kept import Kept
 from gazeloc_app.scene.keypoints import KeypointsLayer
 from gazeloc_app.scene.room import RoomLayer
+from gazeloc_app.scene.shown_frame import ShownFrame
 from gazeloc_app.scene.sizes import size_factor
 from gazeloc_app.scene.tags import TagsLayer
 from gazeloc_app.scene.view import set_start
 from gazeloc_app.state import AppState, Layer
-from gazeloc_core.arrays import Bytes
 from gazeloc_core.charts.palette import colors_of_ids
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.surfaces.glb import WHITE
 from gazeloc_core.surfaces.scan_display import glimpse
 from gazeloc_core.surfaces.viewpoint import room_corners
-from gazeloc_core.trajectory import Trajectory
 from gazeloc_core.transforms import Similarity
 
-THUMBNAIL_PX = 320
 GLIMPSE_POINTS = 60_000
 
 
@@ -80,18 +69,10 @@ class SceneView:
         self.cameras = SceneCameras(scene, data)
         self._dragging = Dragging(data, lambda: self.front, dispatch, kept)
         self._keypoints = KeypointsLayer(scene, on_drag=self._dragging)
-        self._gaze = GazeLayer(scene)
-        self._selected = SelectedFrameLayer(scene)
-        self._settling = Settling()
-        self._drawing = threading.RLock()
-        """Held by who draws: the loop of the store, what waited for rest, and pictures that have come."""
+        self._frame = ShownFrame(server, data, render)
 
     def render(self, state: AppState) -> None:
         """Draw the state."""
-        with self._drawing:
-            self._render_all(state)
-
-    def _render_all(self, state: AppState) -> None:
         scan_from_sfm = shown_scan_from_sfm(self._data, state)
         trajectory = self._data.trajectory(state.recording, self._data.poses_key(state.recording, state.annotation))
         self._draw_scan(state)
@@ -103,12 +84,12 @@ class SceneView:
             (state.annotation.keypoints, state.selected_key, scan_from_sfm),
             lambda: self._keypoints.show(state.annotation.keypoints, scan_from_sfm, state.selected_key),
         )
-        self._draw_frame(state, trajectory)
+        self._frame.show(state.recording, state.frame, trajectory, is_playing=state.is_playing)
         self._show_and_hide(state)
 
     def stop(self) -> None:
         """Draw nothing any more."""
-        self._settling.drop()
+        self._frame.stop()
 
     def facts(self, state: AppState) -> tuple[str, ...]:
         """Sentences about what is drawn with less than there is."""
@@ -131,7 +112,8 @@ class SceneView:
             set_start(self._server, mesh, self._data.scan().up_axis)
             corners = room_corners(mesh)
             self._grid.show(*corners, self._data.scan().up_axis)
-            self._keypoints.size = self._gaze.size = size_factor(*corners)
+            self._keypoints.size = size_factor(*corners)
+            self._frame.resize(self._keypoints.size)
         display = self._screen.display()
         if display is not None:
             self.front = display.front
@@ -175,72 +157,31 @@ class SceneView:
         place = None if scan_from_sfm is None else _numbers(scan_from_sfm)
         self._once("sfm tags", (in_sfm, place), lambda: self._sfm_tags.show(in_sfm, scan_from_sfm))
 
-    def _draw_frame(self, state: AppState, trajectory: Trajectory | None) -> None:
-        camera = self._data.camera(state.recording)
-        pose = None
-        if trajectory is not None and state.frame < len(trajectory):
-            pose = trajectory.pose(state.frame)
-        key = (state.recording, state.frame, trajectory)
-
-        def show() -> None:
-            with self._drawing:
-                if self._once.last("frame") != key:
-                    return  # another frame came while this one waited
-                with self._server.atomic():
-                    show_camera_and_gaze()
-            if pose is not None:
-                job = Frame(recording=state.recording, index=state.frame, width=THUMBNAIL_PX)
-                future = self._render.submit(job, key="thumbnail")
-                future.add_done_callback(when_picture(lambda image: self._paste(key, pose, camera, image)))
-
-        def show_camera_and_gaze() -> None:
-            self._selected.show(pose, camera)
-            ray = gaze_in_scan(self._data, state.recording, state.frame, trajectory)
-            self._gaze.show(*((None,) if ray is None else (ray.origin, ray.direction, ray.hit)))
-
-        later = self._settling.now if state.is_playing else self._settling.soon  # a scene drawn anew holds a page up
-        self._once("frame", key, lambda: later(show))
-
-    def _paste(self, key: object, pose: RigidTransform, camera: Any, image: Bytes) -> None:
-        with self._drawing:
-            if self._once.last("frame") == key:  # another frame may have been chosen while this one was decoded
-                self._selected.show(pose, camera, image)
-
     def _show_and_hide(self, state: AppState) -> None:
-        layers = {
-            Layer.SCAN: (self._room, self._glimpse),
-            Layer.POINTS: (self._cloud,),
-            Layer.SCAN_TAGS: (self._scan_tags,),
-            Layer.SFM_TAGS: (self._sfm_tags,),
-            Layer.PHONE: (self.cameras.phone,),
-            Layer.TRUTH: (self.cameras.truth,),
-            Layer.ESTIMATE: (self.cameras.estimate, self._selected, *self.cameras.compared.values()),
-            Layer.KEYPOINTS: (self._keypoints,),
-            Layer.TAG_POINTS: (self._tag_points,),
-            Layer.GAZE: (self._gaze,),
-            Layer.ERRORS: (self.cameras.errors,),
-            Layer.GRID: (self._grid,),
+        cameras = self.cameras
+        compared = [layer.set_visible for layer in cameras.compared.values()]
+        switches: dict[Layer, tuple[Callable[[bool], None], ...]] = {
+            Layer.SCAN: (self._room.set_visible, self._glimpse.set_visible),
+            Layer.POINTS: (self._cloud.set_visible,),
+            Layer.SCAN_TAGS: (self._scan_tags.set_visible,),
+            Layer.SFM_TAGS: (self._sfm_tags.set_visible,),
+            Layer.PHONE: (cameras.phone.set_visible,),
+            Layer.TRUTH: (cameras.truth.set_visible,),
+            Layer.ESTIMATE: (cameras.estimate.set_visible, self._frame.show_camera, *compared),
+            Layer.KEYPOINTS: (self._keypoints.set_visible,),
+            Layer.TAG_POINTS: (self._tag_points.set_visible,),
+            Layer.GAZE: (self._frame.show_gaze,),
+            Layer.ERRORS: (cameras.errors.set_visible,),
+            Layer.GRID: (self._grid.set_visible,),
         }
-        for layer, parts in layers.items():
+        for layer, of_layer in switches.items():
             is_visible = state.layers.is_visible(layer)
-            self._once(
-                f"visible {layer}",
-                is_visible,
-                lambda parts=parts, on=is_visible: [  # type: ignore[misc]
-                    part.set_visible(on) for part in parts
-                ],
-            )
+            self._once(f"visible {layer}", is_visible, partial(_switch, of_layer, is_visible))
 
 
-def when_picture(use: Callable[[Bytes], None]) -> Callable[[Future[Any]], None]:
-    """A callback for a future of JPEG bytes that passes the picture on; a superseded or failed one is dropped."""
-
-    def done(future: Future[Any]) -> None:
-        if future.exception() is None:
-            bgr = cv2.imdecode(np.frombuffer(future.result(), np.uint8), cv2.IMREAD_COLOR)
-            use(np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8))
-
-    return done
+def _switch(switches: Sequence[Callable[[bool], None]], is_visible: bool) -> None:
+    for switch in switches:
+        switch(is_visible)
 
 
 def _numbers(similarity: Similarity) -> tuple[float, ...]:

@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from gazeloc_app.drawing.jpeg import jpeg_of
 from gazeloc_app.drawing.render_jobs import (
     Cast,
     CastAnswer,
@@ -37,7 +38,6 @@ from gazeloc_core.surfaces.render import RayRenderer, Rendered, Renderer, open_r
 from gazeloc_core.tags.drawing import draw_tags, drawn_tags
 from gazeloc_core.transforms import rigid_from_wxyz
 
-JPEG_QUALITY = 90
 _log = logging.getLogger(__name__)
 
 
@@ -143,14 +143,6 @@ class _Studio:
         caster = self._caster()
         hits = caster.cast(job.origins, job.directions)
         return CastAnswer(caster.points(hits), caster.normals(hits), hits.distance)
-
-
-def jpeg_of(rgb: Bytes) -> bytes:
-    """A picture (H, W, 3) as JPEG."""
-    done, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    if not done:
-        raise RenderError(f"A picture of {rgb.shape[1]}x{rgb.shape[0]} pixels cannot be written as JPEG.")
-    return bytes(data)
 
 
 def _fitted(rgb: Bytes, width: int) -> Bytes:

@@ -12,11 +12,11 @@ from scipy.spatial.transform import RigidTransform
 from gazeloc_app.actions.action import Action, Notify
 from gazeloc_app.actions.picks import Side
 from gazeloc_app.data import ProjectData
+from gazeloc_app.drawing.jpeg import when_picture
 from gazeloc_app.drawing.render_jobs import Frame, Photo, camera_text
 from gazeloc_app.drawing.render_process import RenderProcess
 from gazeloc_app.frames.sightings import frame_pose
 from gazeloc_app.scene.frames import FrameInSceneLayer, look_through
-from gazeloc_app.scene_view import when_picture
 from gazeloc_app.state import AppState, Level
 from gazeloc_core.camera import Camera
 
