@@ -133,7 +133,9 @@ def _on_residuals(evidence: Evidence, options: VerdictOptions) -> list[Verdict]:
     text = f"The keypoints fit to {_cm(within)}"
     text += f", and each is predicted by the others to {_cm(predicted)}." if predicted is not None else "."
     if level != "good":
-        text += " Check the worst of them, and click in the middle of flat things, not on edges."
+        by_hand = any(len(_members(evidence, point.group)) == 1 for point in evidence.inliers)
+        text += " Check the worst of them"
+        text += ", and click in the middle of flat things, not on edges." if by_hand else ": was a tag moved, or bent?"
     return [Verdict(level, text)]
 
 

@@ -251,6 +251,13 @@ def test_a_scan_of_another_scale_is_told_from_wrong_keypoints(on_scan, level, sa
     assert ("on the scan" in texts(alignment, level)) == (on_scan is not None)
 
 
+def test_advice_on_bad_keypoints_is_for_what_they_are():
+    tags = align(make_room(points=500, tag_noise_m=0.04).pairs)
+    assert "was a tag moved, or bent?" in texts(tags, "warning") + texts(tags, "bad")
+    by_hand = align(clicked(CORNERS_OF_ROOM, noise_m=0.04))
+    assert "click in the middle of flat things" in texts(by_hand, "warning") + texts(by_hand, "bad")
+
+
 def test_residual_in_pixels_is_that_of_the_images_in_view():
     room = make_room(points=500)
     pairs = clicked(CORNERS_OF_ROOM[4:5])
