@@ -61,6 +61,11 @@ def until_the_eye_is(page, place, off_m=0.02):
     page.viewer.wait_until(lambda: np.linalg.norm(eye_in_scan(page) - place) < off_m)
 
 
+def has_said(page, text):
+    """Whether a job has ended, or something was refused, with this in its sentence."""
+    return page.state.job is None and page.state.notice is not None and text in page.state.notice.text
+
+
 def test_two_clicks_measure_a_distance_in_this_browser_alone_and_a_third_begins_anew(page, open_page):
     other = open_page(page.app.address, width=700, height=500).wait_until_drawn(300)
     page.choose("A click", TapeTool.name)
@@ -151,7 +156,7 @@ def test_the_view_follows_the_trajectory_only_where_it_is_asked_to(page):
 
 def test_the_worst_frames_are_listed_gone_to_marked_and_exported_with_their_note(page, app):
     page.page.get_by_role("tab", name="Problems", exact=True).click()
-    page.press("Score the frames").until(lambda: page.state.job is None and "scored" in page.state.notice.text, 120)
+    page.press("Score the frames").until(lambda: has_said(page, "scored"), 120)
     first = page.page.locator(".gazeloc-frames a").first
     first.wait_for()
     worst = int(first.locator("b").inner_text().split()[1])
@@ -166,7 +171,7 @@ def test_the_worst_frames_are_listed_gone_to_marked_and_exported_with_their_note
         lambda: page.state.annotation.marks.get(worst) is not None and page.state.annotation.marks.get(worst).note
     )
     page.tab("Export").press("Export")
-    page.until(lambda: page.state.job is None and "files were written" in page.state.notice.text, 120)
+    page.until(lambda: has_said(page, "files were written"), 120)
     with (app.project.folder / "export" / "csv" / "poses.csv").open(newline="") as file:
         row = next(row for row in csv.DictReader(file) if row["frame index"] == str(worst))
     assert (row["mark"], row["note"]) == ("bad", 'the door, "open" <b>')
@@ -191,7 +196,7 @@ def test_keypoints_are_read_from_a_file_of_this_computer_and_saved_to_one(page, 
     with page.page.expect_file_chooser() as chosen:
         page.press("Read keypoints")
     chosen.value.set_files(str(file))
-    page.until(lambda: page.state.notice is not None and "mine.csv" in page.state.notice.text)
+    page.until(lambda: has_said(page, "mine.csv"))
     assert len(page.pairs) == 2
     page.page.mouse.click(640, 20)
     page.page.keyboard.press("Control+z")
@@ -209,9 +214,7 @@ def test_what_was_under_way_when_it_ended_is_offered_and_goes_on(page, app, open
         page = AppPage(open_page(again.address, width=1200, height=700).wait_until_drawn(300), again)
         page.page.get_by_text("GazeLoc was ended while it worked on “Align”.").wait_for()
         assert page.state.job is None
-        page.press("Go on with Align").until(
-            lambda: page.state.job is None and "Aligned" in page.state.notice.text, 120
-        )
+        page.press("Go on with Align").until(lambda: has_said(page, "Aligned"), 120)
         assert page.page.get_by_role("button", name="Go on with Align").count() == 0
     finally:
         again.stop()
