@@ -155,6 +155,7 @@ def test_letters_are_legible_on_pictures_buttons_and_the_banner():
     light, dark, alarm = (on_pictures(name) for name in ("light", "dark", "alarm"))
     assert contrast(light, dark) >= 7
     assert contrast(light, alarm) >= 7
+    assert min(contrast(palette.shades(name)[0], light) for name in ("muted", "bad")) >= 4.5, "grey and red buttons"
     assert on_pictures("veil") == dark, "and nearly opaque, so that it is as good a ground"
     for paper, ink, brand, on_brand in zip(
         (palette.PAPER, palette.PAPER_DARK),
