@@ -19,10 +19,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from gazeloc_core.camera import Camera
 from gazeloc_core.export.tum import write_tum
-from gazeloc_core.project import Project, RecordingEntry, ScanEntry, Settings, TagEntry
+from gazeloc_core.methods import Method
+from gazeloc_core.pipeline import run_after_choice
+from gazeloc_core.project import Chosen, Project, RecordingEntry, ScanEntry, Settings, TagEntry
 from gazeloc_core.scan import Mesh
 from gazeloc_core.sfm_model import SfmModel
 from gazeloc_core.stages import anchoring, inputs, recording, scan
+from gazeloc_core.stages.registration import align_keypoints
 from gazeloc_core.surfaces.raycast import Raycaster
 from gazeloc_core.surfaces.render import RayRenderer
 from gazeloc_core.tag_types import TagCorners, TagSightings
@@ -107,6 +110,14 @@ def make_app_project(folder: Path, *, recordings: tuple[str, ...] = ("walk",), t
 
 
 @lru_cache(maxsize=4)
+def with_poses(project: Project) -> Project:
+    """The project with the alignment of its tags chosen, as by a person, and its poses and gaze made."""
+    alignment = align_keypoints(project, "walk")
+    project.choose("walk", Chosen(alignment=alignment.key, by_person=True))
+    run_after_choice(project, "walk", Method.SFM)
+    return project
+
+
 def _template(recordings: tuple[str, ...], tags: bool) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="gazeloc-app-project-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from app_project import make_app_project
+from app_project import make_app_project, with_poses
 from e2e.app_page import AppPage
 from gazeloc_app.actions.views import CompareWith, ShowFrame
-from gazeloc_app.app import App
 
 from gazeloc_core.frames.marks import Mark
-from gazeloc_core.methods import Method
-from gazeloc_core.pipeline import run_after_choice
-from gazeloc_core.project import Chosen
-from gazeloc_core.stages.registration import align_keypoints
 
 pytestmark = pytest.mark.e2e
 
 
 @pytest.fixture
-def app(tmp_path):
-    project = make_app_project(tmp_path)
-    alignment = align_keypoints(project, "walk")
-    project.choose("walk", Chosen(alignment=alignment.key, by_person=True))
-    run_after_choice(project, "walk", Method.SFM)
-    app = App(project, port=0)
-    app.start()
-    yield app
-    app.stop()
+def project(tmp_path):
+    return with_poses(make_app_project(tmp_path))
 
 
 @pytest.fixture

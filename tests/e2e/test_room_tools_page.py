@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from app_project import MARKS, TAG_SIZE_M, make_app_project, mark_corners, true_poses
+from app_project import MARKS, TAG_SIZE_M, make_app_project, mark_corners, true_poses, with_poses
 from e2e.app_page import AppPage
 from gazeloc_app.actions.jobs import StartJob
 from gazeloc_app.app import App
@@ -17,11 +17,6 @@ from gazeloc_app.tools.scan_point import ScanPointTool
 from gazeloc_app.tools.tape import TapeTool
 from gazeloc_app.work import tasks
 from gazeloc_app.work.job_list import JobList
-
-from gazeloc_core.methods import Method
-from gazeloc_core.pipeline import run_after_choice
-from gazeloc_core.project import Chosen
-from gazeloc_core.stages.registration import align_keypoints
 
 pytestmark = pytest.mark.e2e
 
@@ -33,15 +28,8 @@ CAMERA = """() => {
 
 
 @pytest.fixture
-def app(tmp_path):
-    project = make_app_project(tmp_path)
-    alignment = align_keypoints(project, "walk")
-    project.choose("walk", Chosen(alignment=alignment.key, by_person=True))
-    run_after_choice(project, "walk", Method.SFM)
-    app = App(project, port=0)
-    app.start()
-    yield app
-    app.stop()
+def project(tmp_path):
+    return with_poses(make_app_project(tmp_path))
 
 
 @pytest.fixture
