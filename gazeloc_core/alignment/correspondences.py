@@ -16,6 +16,12 @@ from gazeloc_core.errors import GeometryError
 from gazeloc_core.keypoints import KeypointSet
 from gazeloc_core.tag_types import TagCorners
 
+TAG_SIGMA_M = 0.01
+"""Expected error of a tag's corner per axis, both sides together, in metres on the scan."""
+CLICKED_SIGMA_M = 0.02
+"""The same of a clicked keypoint."""
+_ROUGH_PAIRS = 300
+
 
 @dataclass(frozen=True, eq=False)
 class Correspondences:
@@ -80,18 +86,11 @@ class Correspondences:
         return np.asarray(self.group_index == group)
 
 
-def gather(
-    scan_tags: TagCorners | None,
-    sfm_tags: TagCorners | None,
-    keypoints: KeypointSet,
-    *,
-    tag_sigma_m: float = 0.01,
-    clicked_sigma_m: float = 0.02,
-) -> Correspondences:
+def gather(scan_tags: TagCorners | None, sfm_tags: TagCorners | None, keypoints: KeypointSet) -> Correspondences:
     """The pairs of all tags that both sides know, by id, and of all clicked keypoints that count.
 
-    A tag whose sightings by the phone disagree is expected to be off by as much, beside `tag_sigma_m`; so is a keypoint
-    of which one side or both were triangulated from clicks in frames, beside `clicked_sigma_m`.
+    A tag whose sightings by the phone disagree is expected to be off by as much, beside `TAG_SIGMA_M`; so is a keypoint
+    of which one side or both were triangulated from clicks in frames, beside `CLICKED_SIGMA_M`.
     """
     names: list[str] = []
     groups: list[str] = []
@@ -106,13 +105,13 @@ def gather(
                 groups += [f"tag {tag}"] * 4
                 scan.append(scan_tags.corners[row])
                 sfm.append(sfm_tags.corners[row_in_sfm[int(tag)]])
-                sigmas += [float(np.hypot(tag_sigma_m, np.nan_to_num(scan_tags.spread[row])))] * 4
+                sigmas += [float(np.hypot(TAG_SIGMA_M, np.nan_to_num(scan_tags.spread[row])))] * 4
     clicked, clicked_scan, clicked_sfm = keypoints.counting()
     counting = [pair for pair in keypoints if pair.counts]
     sfm_side, scan_side = np.concatenate([*sfm, clicked_sfm]), np.concatenate([*scan, clicked_scan])
     scale = rough_scale(sfm_side, scan_side)
     sigmas += [
-        float(np.linalg.norm([clicked_sigma_m, pair.scan_sigma or 0.0, scale * (pair.sfm_sigma or 0.0)]))
+        float(np.linalg.norm([CLICKED_SIGMA_M, pair.scan_sigma or 0.0, scale * (pair.sfm_sigma or 0.0)]))
         for pair in counting
     ]
     return Correspondences(
@@ -121,7 +120,12 @@ def gather(
 
 
 def rough_scale(sfm: Floats, scan: Floats) -> float:
-    """Metres per unit of the reconstruction: the median ratio of the distances between pairs (K, 3); 1 for K < 2."""
+    """Metres per unit of the reconstruction: the median ratio of the distances between pairs (K, 3); 1 for K < 2.
+
+    Of many pairs some, evenly, say it well enough: a list from a file may have thousands.
+    """
+    rows = np.unique(np.linspace(0, len(sfm) - 1, min(len(sfm), _ROUGH_PAIRS)).astype(np.int64))
+    sfm, scan = sfm[rows], scan[rows]
     first, second = np.triu_indices(len(sfm), 1)
     apart = np.linalg.norm(sfm[first] - sfm[second], axis=1)
     ratios = np.linalg.norm(scan[first] - scan[second], axis=1)[apart > 0] / apart[apart > 0]

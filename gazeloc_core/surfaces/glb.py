@@ -47,7 +47,7 @@ _LINEAR_U16 = np.rint(linear_from_srgb(np.arange(256)) * 65535).astype(np.uint16
 
 @dataclass(frozen=True)
 class Glb:
-    """A glTF scene of one mesh: its JSON and its binary chunk; `to_bytes` writes the file in any tint and opacity."""
+    """A glTF scene of one mesh: its JSON and its binary chunk; `to_bytes` writes the file in any tint."""
 
     document: dict[str, Any]
     binary: bytes
@@ -71,8 +71,8 @@ class Glb:
             raise InputError.of(Path(name), "the .glb file is damaged", "remove it, it is made again")
         return cls(document, binary)
 
-    def to_bytes(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> bytes:
-        """The .glb file with all colours multiplied (in linear light) by `tint`, and seen through by 1 - `opacity`.
+    def to_bytes(self, tint: Rgb = WHITE, two_sided: bool = True) -> bytes:
+        """The .glb file with all colours multiplied (in linear light) by `tint`.
 
         Faces that are not `two_sided` vanish when seen from behind, such as a room's near walls from outside.
         """
@@ -81,12 +81,8 @@ class Glb:
         for material in self.document["materials"]:
             pbr = material["pbrMetallicRoughness"]
             color = [float(c * f) for c, f in zip(pbr["baseColorFactor"][:3], factor, strict=True)]
-            changed = {
-                **material,
-                "doubleSided": two_sided,
-                "pbrMetallicRoughness": {**pbr, "baseColorFactor": [*color, float(opacity)]},
-            }
-            materials.append({**changed, "alphaMode": "BLEND"} if opacity < 1 else changed)
+            tinted = {**pbr, "baseColorFactor": [*color, 1.0]}
+            materials.append({**material, "doubleSided": two_sided, "pbrMetallicRoughness": tinted})
         text = json.dumps({**self.document, "materials": materials}, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
         binary = self.binary + b"\0" * (-len(self.binary) % 4)

@@ -108,17 +108,16 @@ def test_faces_without_picture_are_grey_beside_those_with_one():
     np.testing.assert_allclose(materials[1]["baseColorFactor"][:3], linear_from_srgb([128] * 3), atol=1e-6)
 
 
-def test_tint_and_opacity_are_in_the_material_only():
+def test_the_tint_and_which_sides_are_drawn_are_in_the_material_only():
     glb = mesh_glb(Mesh(VERTICES, FACES, COLORS))
-    document, binary = parts(glb.to_bytes(tint=(255, 128, 0), opacity=0.25))
+    document, binary = parts(glb.to_bytes(tint=(255, 128, 0)))
     material = document["materials"][0]
     np.testing.assert_allclose(
-        material["pbrMetallicRoughness"]["baseColorFactor"], [*linear_from_srgb([255, 128, 0]), 0.25]
+        material["pbrMetallicRoughness"]["baseColorFactor"], [*linear_from_srgb([255, 128, 0]), 1.0]
     )
-    assert material["alphaMode"] == "BLEND"
     assert parts(glb.to_bytes(two_sided=False))[0]["materials"][0]["doubleSided"] is False
     plain, plain_binary = parts(glb.to_bytes())
-    assert "alphaMode" not in plain["materials"][0]
+    assert plain["materials"][0]["doubleSided"] is True
     assert binary == plain_binary
 
 

@@ -74,7 +74,7 @@ def test_the_room_is_sent_once_and_again_when_its_look_changes(server, sent):
     assert sent == []
     layer.set_visible(False)
     assert [kind for kind, _ in sent] == ["SetSceneNodeVisibilityMessage"]
-    layer.set_look(tint=(255, 0, 0), opacity=0.5)
+    layer.set_look(tint=(255, 0, 0))
     assert ("GlbMessage", "/scan") in sent
     layer.show(None)
     assert "/scan" not in names(server)
@@ -283,7 +283,7 @@ def test_the_picture_stands_where_its_corners_project(server, sent):
     corners = centre + np.array([[-width / 2, -height / 2, 0], [width / 2, height / 2, 0]])
     np.testing.assert_allclose(CAMERA.project(corners), [[0, 0], [320, 240]], atol=1e-9)
     layer = FrameInSceneLayer(server.scene)
-    layer.show(RigidTransform.identity(), CAMERA, np.zeros((240, 320, 3), np.uint8), opacity=0.5)
+    layer.show(RigidTransform.identity(), CAMERA, np.zeros((240, 320, 3), np.uint8))
     assert "/picture" in names(server)
     layer.show(None, None, None)
     assert "/picture" not in names(server)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gazeloc_core.alignment.alignment import Alignment, AlignmentMethod, AlignOptions, align, consensus, judge
-from gazeloc_core.alignment.correspondences import Correspondences, gather
+from gazeloc_core.alignment.correspondences import CLICKED_SIGMA_M, Correspondences, gather, rough_scale
 from gazeloc_core.alignment.evidence import reprojection_px
 from gazeloc_core.alignment.left_out import leave_one_out
 from gazeloc_core.alignment.similarity_fit import fit_similarity, residuals, solve_umeyama
@@ -330,5 +330,12 @@ def test_what_is_known_about_either_side_of_a_clicked_keypoint_adds_to_its_expec
         KeypointPair(f"k{i}", "", place, tuple(x / 2 for x in place), **sigma)
         for i, (place, sigma) in enumerate(zip(places, sigmas, strict=True))
     ]
-    found = gather(None, None, KeypointSet(tuple(pairs)), clicked_sigma_m=0.01).sigma_m
-    np.testing.assert_allclose(found**2, [0.01**2, 0.01**2 + 0.03**2, 0.01**2 + 0.03**2 + 0.04**2])
+    found = gather(None, None, KeypointSet(tuple(pairs))).sigma_m
+    own = CLICKED_SIGMA_M**2
+    np.testing.assert_allclose(found**2, [own, own + 0.03**2, own + 0.03**2 + 0.04**2])
+
+
+def test_the_rough_scale_of_thousands_of_pairs_is_known_without_comparing_each_with_each():
+    scan = np.random.default_rng(0).normal(size=(200_000, 3))  # each with each would be 20 thousand million pairs
+    assert rough_scale(scan / 3, scan) == pytest.approx(3)
+    assert rough_scale(scan[:1], scan[:1]) == rough_scale(scan[:0], scan[:0]) == 1

@@ -12,8 +12,9 @@ from gazeloc_app.palette import SHOWN_FRAME
 from gazeloc_app.scene.placing import pose_arguments
 from gazeloc_core.arrays import Bytes, Floats
 from gazeloc_core.camera import Camera
-from gazeloc_core.surfaces.glb import Rgb
 
+_DEPTH_M = 0.3
+"""Height of the pyramid of the frame that is looked at."""
 PLANE_M = 0.5
 """Distance from the camera at which its picture stands in the scene."""
 
@@ -21,10 +22,8 @@ PLANE_M = 0.5
 class SelectedFrameLayer:
     """The frame that is looked at, as one real frustum with its picture, at `/selected`."""
 
-    def __init__(self, scene: viser.SceneApi, color: Rgb = SHOWN_FRAME, depth_m: float = 0.3):
+    def __init__(self, scene: viser.SceneApi):
         self._scene = scene
-        self._color = color
-        self._depth_m = depth_m
         self._shown: tuple[object, ...] = ()
         self._handle: viser.CameraFrustumHandle | None = None
         self._visible = True
@@ -45,8 +44,8 @@ class SelectedFrameLayer:
             "/selected",
             fov=vertical_fov_rad(camera),
             aspect=camera.width / camera.height * camera.focal_px[1] / camera.focal_px[0],
-            scale=self._depth_m,
-            color=self._color,
+            scale=_DEPTH_M,
+            color=SHOWN_FRAME,
             thickness=2.0,
             thickness_units="screen",
             image=image,
@@ -75,18 +74,13 @@ class FrameInSceneLayer:
         self._scene = scene
         self._handle: viser.ImageHandle | None = None
 
-    def show(
-        self, scan_from_camera: RigidTransform | None, camera: Camera | None, image: Bytes | None, opacity: float = 1.0
-    ) -> None:
-        """Stand the (undistorted) picture before the pinhole `camera`; below 1, `opacity` shows the scan behind."""
+    def show(self, scan_from_camera: RigidTransform | None, camera: Camera | None, image: Bytes | None) -> None:
+        """Stand the (undistorted) picture before the pinhole `camera`; None takes it away."""
         if scan_from_camera is None or camera is None or image is None:
             if self._handle is not None:
                 self._handle.remove()
                 self._handle = None
             return
-        if opacity < 1:
-            alpha = np.full((*image.shape[:2], 1), round(255 * max(opacity, 0.0)), dtype=np.uint8)
-            image = np.concatenate([image, alpha], axis=2)
         wxyz, _ = pose_arguments(scan_from_camera)
         width, height, centre_in_camera = picture_plane(camera)
         position = scan_from_camera.apply(np.array(centre_in_camera))
@@ -95,8 +89,8 @@ class FrameInSceneLayer:
             image,
             render_width=width,
             render_height=height,
-            format="png" if opacity < 1 else "jpeg",
-            jpeg_quality=None if opacity < 1 else 90,
+            format="jpeg",
+            jpeg_quality=90,
             wxyz=wxyz,
             position=position,
             cast_shadow=False,

@@ -13,11 +13,10 @@ class RoomLayer:
     Never attach a click handler to its node: that costs the browser 136 ms per mouse move at 1.5 million triangles.
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str = "/scan"):
+    def __init__(self, scene: viser.SceneApi):
         self._scene = scene
-        self._name = name
         self._glb: Glb | None = None
-        self._look: tuple[Rgb, float, bool] = (WHITE, 1.0, True)
+        self._look: tuple[Rgb, bool] = (WHITE, True)
         self._handle: viser.GlbHandle | None = None
         self._visible = True
 
@@ -32,9 +31,9 @@ class RoomLayer:
         """Whether nothing is drawn yet."""
         return self._glb is None
 
-    def set_look(self, tint: Rgb = WHITE, opacity: float = 1.0, two_sided: bool = True) -> None:
-        """Tint all colours, let the room be seen through, or hide faces from behind (`two_sided` False)."""
-        look = (tint, min(max(opacity, 0.0), 1.0), two_sided)
+    def set_look(self, tint: Rgb = WHITE, two_sided: bool = True) -> None:
+        """Tint all colours, or hide faces from behind (`two_sided` False)."""
+        look = (tint, two_sided)
         if look != self._look:
             self._look = look
             self._draw()
@@ -51,10 +50,9 @@ class RoomLayer:
                 self._handle.remove()
                 self._handle = None
             return
-        tint, opacity, two_sided = self._look
         self._handle = self._scene.add_glb(
-            self._name,
-            self._glb.to_bytes(tint, opacity, two_sided),
+            "/scan",
+            self._glb.to_bytes(*self._look),
             cast_shadow=False,
             receive_shadow=False,
             visible=self._visible,
