@@ -159,7 +159,7 @@ class TestTheFirstStepFitsTheProject:
     def test_a_run_that_is_under_way_is_not_asked_for(self, tmp_path):
         start = StartJob("Run everything", tasks.run_all, (("recording", "walk"),))
         card = self.card(self.without_stages(make_app_project(tmp_path)), start)
-        assert "Process.</b> “Run everything” is at work, see above." in card
+        assert "Process.</b> “Run everything” is at work, see the top right." in card
         assert "Press" not in card
 
     def test_with_a_model_of_colmap(self, tmp_path):

@@ -43,7 +43,7 @@ def test_a_panel_says_what_to_press_and_while_that_runs_that_it_does(data):
         assert "“Run everything” in the tab" in sentence or "press Align" in sentence
         assert "at work" not in sentence
     for sentence in said(data, RUN.apply(state)):
-        assert "“Run everything” is at work, see above." in sentence
+        assert "“Run everything” is at work, see the top right." in sentence
         assert "press" not in sentence.lower()
 
 
@@ -51,7 +51,7 @@ def test_only_work_that_answers_counts_and_only_for_the_recording_that_is_open()
     state = AppState(("walk", "sit"), "walk")
     figures = StartJob("Draw the figures", tasks.draw_figures, ABOUT_WALK).apply(state)
     assert meanwhile(figures, tasks.run_all) == ""
-    assert meanwhile(figures) == "“Draw the figures” is at work, see above."
-    assert meanwhile(RUN.apply(figures), tasks.run_all) == "“Run everything” is next, see above."
+    assert meanwhile(figures) == "“Draw the figures” is at work, see the top right."
+    assert meanwhile(RUN.apply(figures), tasks.run_all) == "“Run everything” is next, see the top right."
     other = StartJob("Run everything", tasks.run_all, (("recording", "sit"),)).apply(state)
     assert meanwhile(other) == ""

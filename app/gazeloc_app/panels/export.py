@@ -34,13 +34,13 @@ class ExportPanel:
         self._has_poses = False
         self._data = data
         self._dispatch = dispatch
+        self._first = gui.add_html("", visible=False)
         self._boxes = {
             name: gui.add_checkbox(label, name == "csv", hint=hint) for name, (label, hint) in FORMATS.items()
         }
         self._root = root
         self._folder = gui.add_text("Folder", "", hint="A name, of a folder that is made in the one below.")
         self._button = gui.add_button("Export", hint="Writes on the computer that runs GazeLoc.")
-        self._first = gui.add_html("", visible=False)
         gui.add_html(widgets.box(f"Into {widgets.text(root)}."))
         gui.add_html(widgets.box("Exported frames show people. Treat them like the recordings themselves."))
         widgets.on_user(self._button, lambda _: self._export(), event="on_click")

@@ -12,5 +12,9 @@ def meanwhile(state: AppState, *tasks: Callable[..., Any]) -> str:
     """A sentence while one of the tasks, or with none given any, runs or waits for the open recording; else ""."""
     for job in state.jobs:
         if job.recording == state.recording and (not tasks or job.task in tasks):
-            return f"“{job.name}” is at work, see above." if job is state.job else f"“{job.name}” is next, see above."
+            return (
+                f"“{job.name}” is at work, see the top right."
+                if job is state.job
+                else f"“{job.name}” is next, see the top right."
+            )
     return ""
