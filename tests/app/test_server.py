@@ -5,6 +5,7 @@ import gzip
 import http.client
 import inspect
 import socket
+import struct
 import time
 
 import pytest
@@ -92,6 +93,23 @@ def test_who_leaves_before_the_answer_leaves_no_traceback_in_the_log(server, cap
         time.sleep(0.3)
         leave(visitor)
         time.sleep(1.2)
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+    assert get(server)[0] == 200
+
+
+@pytest.mark.parametrize("reset", [True, False])
+@pytest.mark.parametrize("asked", ["", "GET", "GET /slow HTTP/1.1\r\nHost: localhost\r\n\r\n", "nonsense\r\n\r\n"])
+def test_crowds_that_leave_at_any_moment_leave_no_traceback_in_the_log(server, caplog, asked, reset):
+    for i in range(12):
+        with socket.create_connection(("127.0.0.1", server.get_port())) as visitor:
+            visitor.sendall(asked.encode())
+            time.sleep(0.004 * (i % 4))
+            if reset:
+                visitor.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            elif i % 2:
+                visitor.shutdown(socket.SHUT_WR)
+                time.sleep(0.01)
+    time.sleep(1.2)
     assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
     assert get(server)[0] == 200
 

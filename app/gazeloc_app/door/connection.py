@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.frames import CloseCode
 from websockets.http11 import Response
 
@@ -102,6 +103,21 @@ class VisitorConnection(ServerConnection):
                 answer(response)
 
         protocol.send_response = send_response  # type: ignore[method-assign]
+
+    async def handshake(self, *parts: Any, **options: Any) -> None:
+        """The answer to the request; who leaves meanwhile, or asks for nonsense, is no fault to be logged as one."""
+        try:
+            await super().handshake(*parts, **options)
+        except (ConnectionClosed, InvalidHandshake) as error:
+            self._forget(error)
+        except AssertionError as error:  # `websockets` asserts that nobody leaves while the answer is drawn
+            if self.close_deadline is None:
+                raise
+            self._forget(error)
+
+    def _forget(self, error: Exception) -> None:
+        log.info("a visitor left before its answer, or asked for nonsense (%r)", error)
+        self.transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Part of asyncio's protocol."""
