@@ -82,10 +82,14 @@ class SceneView:
         self._once(
             "keypoints",
             (state.annotation.keypoints, state.selected_key, scan_from_sfm),
-            lambda: self._keypoints.show(state.annotation.keypoints, scan_from_sfm, state.selected_key),
+            lambda: self._draw_keypoints(state, scan_from_sfm),
         )
         self._frame.show(state.recording, state.frame, trajectory, is_playing=state.is_playing)
         self._show_and_hide(state)
+
+    def _draw_keypoints(self, state: AppState, scan_from_sfm: Similarity | None) -> None:
+        with self._server.atomic():  # a step of many keypoints shows whole in every page, or not yet
+            self._keypoints.show(state.annotation.keypoints, scan_from_sfm, state.selected_key)
 
     def stop(self) -> None:
         """Draw nothing any more."""
