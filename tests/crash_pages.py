@@ -6,6 +6,9 @@ page reads them from the DOM and from the scene. The app writes every state to a
 
 - the app must start with a state that was wanted, and that is no earlier than the last one that either page showed;
 - both pages must come back by themselves, and show just that.
+
+A busy page may draw the keypoints of one step in more than one go. What it shows in between is no state, and says of
+each keypoint that it shows, and of nothing else, that it is saved.
 """
 
 from __future__ import annotations
@@ -165,23 +168,41 @@ def _allowed(entries: list[dict[str, Any]], pages: list[_Shown], outcome: Outcom
     """The states with which the next life may begin: from the last one that a page showed on."""
     last = 0
     for number, one in enumerate(pages):
-        for part, is_same in (("rows", _same_rows), ("places", _same_places)):
+        for part, first in (("rows", _first_rows), ("places", _first_places)):
             place = 0
             for said in one.said:
-                found = _first(entries, place, said[part], part, is_same)
+                found = first(entries, place, said[part])
                 if found is None:
-                    outcome.lost.append(f"{life}: page {number} showed {part} that were never saved")
+                    outcome.lost.append(f"{life}: page {number} showed {part} that were never saved: {said[part]}")
                 else:
                     place = found
             last = max(last, place)
     return [entry["state"] for entry in entries[last:]]
 
 
-def _first(
-    entries: list[dict[str, Any]], start: int, said: Any, part: str, is_same: Callable[[Any, Any], bool]
-) -> int | None:
+def _first_rows(entries: list[dict[str, Any]], start: int, said: Any) -> int | None:
+    return _first(entries, start, lambda state: _same_rows(said, state["rows"]))
+
+
+def _first_places(entries: list[dict[str, Any]], start: int, said: Any) -> int | None:
+    """The first state with these keypoints and no other; where none is, the first by which each of them was there."""
+    whole = _first(entries, start, lambda state: _same_places(said, state["places"]))
+    if whole is not None:
+        return whole
+    each = [
+        _first(entries, start, lambda state, key=key: _same_places({key: said[key]}, _only(key, state)))  # type: ignore[misc]
+        for key in said
+    ]
+    return None if None in each else max((number for number in each if number is not None), default=start)
+
+
+def _only(key: str, state: Any) -> dict[str, Any]:
+    return {key: state["places"][key]} if key in state["places"] else {}
+
+
+def _first(entries: list[dict[str, Any]], start: int, is_it: Callable[[Any], bool]) -> int | None:
     wanted = enumerate(entries[start:], start)
-    return next((number for number, entry in wanted if is_same(said, entry["state"][part])), None)
+    return next((number for number, entry in wanted if is_it(entry["state"])), None)
 
 
 def _same_rows(said: Any, wanted: Any) -> bool:
