@@ -1,6 +1,8 @@
 // When the page opens, the room is drawn first and the panels are filled then: React takes longer for two hundred widgets
 // than the viewer for half a million triangles. What viser's worker hands over for panels is kept back, in its order,
 // until all that came of the scene was drawn once, for LONGEST_MS at most. After a lost connection nothing is kept back.
+// On a busy machine viser may by then stand at a place of its own: a view that neither a hand nor the app has moved is
+// put where it is to start.
 window.gazelocScene = (function sceneFirst() {
   const LONGEST_MS = 4000;
   const AT_LAST_MS = 15000; // since the page was loaded: should viser's worker speak another language, nothing waits for it
@@ -13,6 +15,7 @@ window.gazelocScene = (function sceneFirst() {
   let connections = 0;
   let isHolding = true;
   let hasAll = false;
+  let isMoved = false;
 
   function take(data, pass) {
     if (data.type === "connected") {
@@ -30,6 +33,7 @@ window.gazelocScene = (function sceneFirst() {
     for (const message of data.messages) {
       (isForPanels(message) ? held : now).push(message);
       if (LARGE.has(message.type)) awaited.add(message.name);
+      if (message.type.startsWith("SetCamera") && !message.initial) isMoved = true;
       if (message.type === "ReplayDoneMessage") hasAll = true;
     }
     if (now.length) pass({ type: "message_batch", messages: now });
@@ -61,10 +65,16 @@ window.gazelocScene = (function sceneFirst() {
     return hasAll && [...awaited].every((name) => nodes[name]);
   }
 
+  function standAtTheStart() {
+    const viewer = window.__viserMutable;
+    if (!isMoved && viewer && viewer.cameraControl && viewer.resetCameraPose) viewer.resetCameraPose(false);
+  }
+
   function release() {
     if (!isHolding) return;
     const messages = held;
     forget();
+    standAtTheStart();
     if (handOver && messages.length) handOver({ type: "message_batch", messages });
   }
 
@@ -77,6 +87,8 @@ window.gazelocScene = (function sceneFirst() {
     }
   };
 
+  for (const kind of ["pointerdown", "wheel", "keydown"])
+    addEventListener(kind, () => (isMoved = true), { capture: true, passive: true });
   setTimeout(release, AT_LAST_MS);
-  return { isComplete, release };
+  return { isComplete, isReleased: () => !isHolding, release };
 })();

@@ -163,3 +163,24 @@ def test_after_a_lost_connection_the_panels_are_there_again(server, open_page): 
     page.wait_until(lambda: set(server.get_clients()) - before)
     button.wait_for()
     assert button.count() == 1
+
+
+_STAND_ELSEWHERE = """
+const elsewhere = setInterval(() => {
+  const viewer = window.__viserMutable;
+  if (!viewer || !viewer.cameraControl || !window.gazelocScene) return;
+  if (window.gazelocScene.isReleased()) clearInterval(elsewhere);
+  else viewer.cameraControl.setPosition(3, 3, 3);
+}, 5);
+"""
+
+
+def test_a_page_stands_at_the_start_wherever_the_viewer_stood_while_it_loaded(server, open_page):  # noqa: F811
+    middle, back = np.array([1.5, 1.0, 1.0]), np.array([0.0, -4.0, 3.0])
+    server.initial_camera.position = middle + back
+    server.initial_camera.look_at = middle
+    page = open_page(address(server), script=_STAND_ELSEWHERE)
+    page.wait_until(lambda: page.page.evaluate("() => !!window.gazelocScene && window.gazelocScene.isReleased()"))
+    page.wait_until_drawn(300)
+    ends = page.project([middle + back / 2, middle - back / 2])  # on the axis of the view
+    assert np.abs(ends[0] - ends[1]).max() < 2
