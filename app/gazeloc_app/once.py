@@ -16,7 +16,3 @@ class Once:
         if name not in self._shown or self._shown[name] != shown:
             self._shown[name] = shown
             draw()
-
-    def last(self, name: str) -> object:
-        """What was shown the last time, None before the first."""
-        return self._shown.get(name)

@@ -4,25 +4,15 @@ import html
 import re
 
 import numpy as np
-import pytest
-from app_steps import step, stop
+from app_steps import step
 from gazeloc_app.actions.choices import ChooseAlignment
 from gazeloc_app.actions.picks import PickPoint, Side
 from gazeloc_app.actions.views import ShowFrame
-from gazeloc_app.app import App
 from gazeloc_app.drawing.pictures import render_url
 from gazeloc_app.panels.comparison import NO_POSE, NO_POSES
 from gazeloc_app.panels.frames import FramePanel
 
 from gazeloc_core.stages.registration import align_keypoints
-
-
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.store._render()
-    yield app
-    stop(app)
 
 
 def panel_of(app):

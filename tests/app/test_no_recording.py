@@ -33,14 +33,6 @@ def project(tmp_path):
     return project
 
 
-@pytest.fixture
-def app(project):
-    app = App(project, port=0)
-    app.store._render()
-    yield app
-    stop(app)
-
-
 def test_it_shows_the_room_and_says_how_to_add_a_recording(app, project):
     boxes = app.panels.of(LayerPanel)._boxes
     offered = [layer for layer in Layer if boxes[layer].visible]
