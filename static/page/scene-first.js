@@ -87,8 +87,14 @@ window.gazelocScene = (function sceneFirst() {
     }
   };
 
+  // A notice that is closed, a button that is pressed move nothing.
+  function isOfTheView(event) {
+    const viewer = window.__viserMutable;
+    return event.type === "keydown" ? event.target === document.body : !!viewer && event.target === viewer.canvas;
+  }
+
   for (const kind of ["pointerdown", "wheel", "keydown"])
-    addEventListener(kind, () => (isMoved = true), { capture: true, passive: true });
+    addEventListener(kind, (event) => (isMoved ||= isOfTheView(event)), { capture: true, passive: true });
   setTimeout(release, AT_LAST_MS);
   return { isComplete, isReleased: () => !isHolding, release };
 })();

@@ -26,12 +26,16 @@ def app(tmp_path_factory):
 def with_two_pages(app, look):
     """What `look(secrets, visits)` says while two pages are open."""
 
+    def people():
+        step(app)
+        return len(app.store.state.people)
+
     async def talk():
+        await until(lambda: people() == 0)  # those of the test before have gone
         async with page(app.server.get_port()) as first, page(app.server.get_port()) as second:
             for visitor in (first, second):
                 await visitor.send(CAMERA)
-            await until(lambda: len(app._visitors._visits) == 2)
-            step(app)
+            await until(lambda: people() == 2 == len(app._visitors._visits))
             return await asyncio.to_thread(look, *zip(*app._visitors._visits.items(), strict=True))
 
     return asyncio.run(talk())

@@ -158,6 +158,27 @@ def test_a_connection_whose_loss_is_not_known_yet_gives_its_view_to_the_next(pla
     assert place.memory.get(TAB).position == (7, 8, 9)
 
 
+def test_a_page_that_says_hello_again_stays_where_it_is(place):
+    client, one = place.come(TAB)
+    client.camera.position = np.array([4.0, 5, 6])
+    place.visitors.remember()
+    client.camera.position = np.array([7.0, 8, 9])
+    assert place.ask(client.secret, f"hello?tab={TAB}&name=Ada") == (200, "here")
+    assert tuple(client.camera.position) == (7, 8, 9)
+    one.take_again.assert_not_called()
+    assert [person.name for person in place.state.people] == ["Ada"]
+
+
+def test_where_the_viewer_stands_while_a_page_is_loaded_is_not_its_view(place):
+    client, _ = place.come(TAB)
+    place.visitors.go(client)
+    assert place.memory.get(TAB) is None
+    client, one = place.come(TAB)
+    one.tool.name = "sets a point"
+    place.visitors.go(client)
+    assert place.memory.get(TAB).tool == "sets a point"
+
+
 def test_views_survive_a_restart_and_a_damaged_file_harms_nothing(place, tmp_path):
     client, _ = place.come(TAB)
     client.camera.position = np.array([4.0, 5, 6])

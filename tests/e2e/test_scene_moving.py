@@ -166,6 +166,13 @@ def test_after_a_lost_connection_the_panels_are_there_again(server, open_page): 
 
 
 _STAND_ELSEWHERE = """
+document.addEventListener("DOMContentLoaded", () => {
+  for (const kind of ["pointerdown", "keydown"]) {
+    const field = document.body.appendChild(document.createElement("input"));
+    field.dispatchEvent(new Event(kind, { bubbles: true })); // as when a notice is closed, or a name is typed
+    field.remove();
+  }
+});
 const elsewhere = setInterval(() => {
   const viewer = window.__viserMutable;
   if (!viewer || !viewer.cameraControl || !window.gazelocScene) return;

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import viser
@@ -22,6 +22,16 @@ class Visit:
     people: PeopleBar
     onlookers: PeopleLayer
     tab: str | None = None
+    _first_view: View | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._first_view = self.view
+
+    @property
+    def view_to_keep(self) -> View | None:
+        """The view to come back to; None for the first one: a page that is being loaded stands at viser's own place."""
+        view = self.view
+        return None if view == self._first_view else view
 
     @property
     def view(self) -> View | None:

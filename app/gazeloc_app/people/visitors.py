@@ -120,10 +120,11 @@ class Visitors:
             if other.tab == tab and other is not visit:
                 self._remember(other)
                 other.tab = None
-        view = self._memory.get(tab)
-        visit.tab = tab
-        if view is not None:
-            visit.come_back(view)
+        if visit.tab != tab:  # a page says hello again whenever its panels are built anew, and stays where it is
+            visit.tab = tab
+            view = self._memory.get(tab)
+            if view is not None:
+                visit.come_back(view)
         self._name(visit, query)
 
     def _name(self, visit: Visit, query: Mapping[str, str]) -> None:
@@ -139,7 +140,7 @@ class Visitors:
 
     def _remember(self, visit: Visit) -> None:
         if visit.tab is not None:
-            view = visit.view
+            view = visit.view_to_keep
             if view is not None:
                 self._memory.put(visit.tab, view)
 
