@@ -179,6 +179,14 @@ def test_where_the_viewer_stands_while_a_page_is_loaded_is_not_its_view(place):
     assert place.memory.get(TAB).tool == "sets a point"
 
 
+def test_a_tool_that_was_put_down_again_is_not_in_hand_after_a_reload(place):
+    _, one = place.come(TAB)
+    for tool in ("sets a point", "a tool"):
+        one.tool.name = tool
+        place.visitors.remember()
+        assert place.memory.get(TAB).tool == tool
+
+
 def test_views_survive_a_restart_and_a_damaged_file_harms_nothing(place, tmp_path):
     client, _ = place.come(TAB)
     client.camera.position = np.array([4.0, 5, 6])

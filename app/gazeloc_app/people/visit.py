@@ -27,11 +27,13 @@ class Visit:
     def __post_init__(self) -> None:
         self._first_view = self.view
 
-    @property
     def view_to_keep(self) -> View | None:
-        """The view to come back to; None for the first one: a page that is being loaded stands at viser's own place."""
+        """The view to come back to; None until it was another than the first, which is viser's own."""
         view = self.view
-        return None if view == self._first_view else view
+        if view == self._first_view:
+            return None
+        self._first_view = None  # from now on it is one that somebody went back to
+        return view
 
     @property
     def view(self) -> View | None:

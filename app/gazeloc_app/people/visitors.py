@@ -140,7 +140,7 @@ class Visitors:
 
     def _remember(self, visit: Visit) -> None:
         if visit.tab is not None:
-            view = visit.view_to_keep
+            view = visit.view_to_keep()
             if view is not None:
                 self._memory.put(visit.tab, view)
 
